@@ -9,8 +9,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import NotAllowedError, RefusedError, SilentError, TelemetryError, TransferError
 from telemetry.link.adopted import AdoptedVehicle
-from telemetry.mavlink.logs.ftp.listing import FtpList
-from telemetry.mavlink.logs.ftp.log_files import FOLDERS, file_of_each
+from telemetry.mavlink.logs.ftp.listing import FtpEntry, FtpList
+from telemetry.mavlink.logs.ftp.log_files import FOLDERS, LogFolder, day_folders, file_of_each
 from telemetry.mavlink.logs.ftp.questions import Numbers
 from telemetry.mavlink.logs.ftp.reading import FtpRead
 from telemetry.mavlink.logs.ftp.whole import FtpReadWhole
@@ -95,7 +95,7 @@ class LogReading:
             return self._tell_instead("the vehicle offers none")
         folder = FOLDERS.get(self._vehicle.state.autopilot)
         if folder is None:
-            return self._tell_instead("this autopilot has no one folder of them")
+            return self._tell_instead("where this autopilot keeps them is not known")
         try:
             if self._paths is None:
                 self._paths = await self._find_files(folder)
@@ -112,11 +112,17 @@ class LogReading:
         assert isinstance(content, bytes)
         return content
 
-    async def _find_files(self, folder: str) -> dict[int, str]:
-        listing = FtpList(folder, target=self._vehicle.target, numbers=self._numbers)
-        entries = await self._run(listing)
+    async def _find_files(self, folder: LogFolder) -> dict[int, str]:
+        found = await self._list_folder(folder.path)
+        if not folder.has_days:
+            return file_of_each(self._logs, {folder.path: found}, folder)
+        listed = {day: await self._list_folder(day) for day in day_folders(found, folder)}
+        return file_of_each(self._logs, listed, folder)
+
+    async def _list_folder(self, path: str) -> tuple[FtpEntry, ...]:
+        entries = await self._run(FtpList(path, target=self._vehicle.target, numbers=self._numbers))
         assert isinstance(entries, tuple)
-        return file_of_each(self._logs, entries, folder)
+        return entries
 
     def _tell_instead(self, why: str) -> None:
         """Once for each list."""

@@ -95,3 +95,25 @@ def test_a_number_that_the_vehicle_does_not_have(link: str, tmp_path: Path) -> N
     run = hedgehop("logs", "get", "99", "--link", link, "--out", tmp_path)
     assert run.code != 0
     assert "There is no log 99 on the vehicle." in run.err
+
+
+def test_a_px4_writes_ulogs_that_are_listed_read_as_files_and_reviewed(tmp_path: Path) -> None:
+    with simulated_vehicle(HOME, "--autopilot", "px4", "--boot-s", 1, "--speedup", 10) as link:
+        line = mavutil.mavlink_connection(link, source_system=254)
+        for _ in range(2):
+            _armed(line)
+            _disarmed(line)
+        line.close()
+        listed = hedgehop("logs", "list", "--link", link, "--json")
+        assert listed.code == 0, listed.err
+        assert [log["number"] for log in listed.json["logs"]] == [1, 0]
+        got = hedgehop("logs", "get", "newest", "--link", link, "--out", tmp_path, "--json")
+        assert got.code == 0, got.err
+    file = Path(got.json["file"])
+    assert file.name == "log-1-1.ulg"
+    assert file.stat().st_size == listed.json["logs"][0]["bytes"]
+    flight = read_flight_log(file)
+    assert (flight.kind, flight.faults) == ("ulog", ())
+    assert [armed for _, armed in flight.armed] == [True, False]
+    assert flight.vehicle.firmware_version == "1.17.0"
+    assert "block by block" not in got.err + got.out

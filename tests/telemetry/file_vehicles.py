@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any, cast
 
-from telemetry.simulation.simulator.own_log import OwnLogs, SimulatedLog
+from telemetry.simulation.simulator.own_logs.keeping import OwnLogs
 from telemetry.simulation.simulator.protocol.file_protocol import FileProtocol
 
 FOLDER = "/APM/LOGS"
@@ -13,8 +13,9 @@ FOLDER = "/APM/LOGS"
 
 class FileVehicle:
     def __init__(self, logs: list[bytes]) -> None:
-        own = SimpleNamespace(logs=[SimulatedLog(1_700_000_000.0, bytearray(log)) for log in logs])
-        self.files = FileProtocol(cast(OwnLogs, own), FOLDER)
+        files = {path(number): bytearray(log) for number, log in enumerate(logs, start=1)}
+        own = SimpleNamespace(files=files, writer=SimpleNamespace(folder=FOLDER))
+        self.files = FileProtocol(cast(OwnLogs, own), most_sessions=4)
 
     def on_message(self, message: Any, now_s: float) -> list[Any]:
         if message.get_type() != "FILE_TRANSFER_PROTOCOL":  # a frame can be spoilt into another one

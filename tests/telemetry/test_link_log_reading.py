@@ -14,7 +14,7 @@ from telemetry.errors import NotAllowedError, TransferError
 from telemetry.link.exchanges import Exchanges
 from telemetry.link.log_reading import LogReading
 from telemetry.mavlink.logs.ftp.listing import FtpEntry
-from telemetry.mavlink.logs.ftp.log_files import file_of_each
+from telemetry.mavlink.logs.ftp.log_files import FOLDERS, MOST_DAYS, day_folders, file_of_each
 from telemetry.topics.requests import Operator, ReadVehicleLog
 from telemetry.topics.vehicle import VehicleState
 from telemetry.topics.vehicle_logs import MOST_BYTES, VehicleLog
@@ -166,7 +166,7 @@ def test_of_two_logs_of_the_same_size_no_file_is_guessed() -> None:
     [
         ({"capabilities": 0}, "the vehicle offers none"),
         ({"capabilities": None}, "the vehicle offers none"),
-        ({"autopilot": "px4"}, "no one folder"),
+        ({"autopilot": "other"}, "not known"),
         ({"files": []}, "not certain"),
     ],
 )
@@ -219,4 +219,20 @@ def test_files_are_told_by_their_sizes_also_where_their_numbers_went_on() -> Non
         FtpEntry("LASTLOG.TXT", False, 900),
         FtpEntry("00000044.BIN", True, 900),
     ]
-    assert file_of_each(logs, entries, "/APM/LOGS") == {1: "/APM/LOGS/00000041.BIN"}
+    listed = {"/APM/LOGS": entries}
+    assert file_of_each(logs, listed, FOLDERS["ardupilot"]) == {1: "/APM/LOGS/00000041.BIN"}
+
+
+def test_px4_has_a_folder_for_each_day_and_the_same_size_on_two_days_is_no_certain_file() -> None:
+    folder = FOLDERS["px4"]
+    days = [FtpEntry("2026-05-01", True, 0), FtpEntry("2026-05-03", True, 0), FtpEntry("readme.txt", False, 9)]
+    first, second = day_folders(days, folder)[::-1]
+    assert (first, second) == ("/fs/microsd/log/2026-05-01", "/fs/microsd/log/2026-05-03")
+    logs = [VehicleLog(0, 700, None), VehicleLog(1, 900, None), VehicleLog(2, 800, None)]
+    listed = {
+        first: [FtpEntry("09_10_11.ulg", False, 700), FtpEntry("10_10_11.ulg", False, 800)],
+        second: [FtpEntry("09_10_11.ulg", False, 900), FtpEntry("12_00_00.ulg", False, 800)],
+    }
+    assert file_of_each(logs, listed, folder) == {0: f"{first}/09_10_11.ulg", 1: f"{second}/09_10_11.ulg"}
+    many = [FtpEntry(f"2026-05-{day:03d}", True, 0) for day in range(MOST_DAYS + 5)]
+    assert day_folders(many, folder)[-1].endswith("2026-05-005")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
@@ -10,6 +11,7 @@ from pymavlink.dialects.v20.ardupilotmega import MAVLink_message
 from telemetry.simulation.simulator.autopilot.autopilot import Autopilot
 from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
 from telemetry.simulation.simulator.autopilot.pilot import Text
+from telemetry.simulation.simulator.own_logs.dataflash_writing import DataflashWriter
 from telemetry.simulation.simulator.protocol.command_protocol import MODE_NUMBERS, Commands
 from telemetry.simulation.simulator.protocol.dialect import Dialect, Parts
 from telemetry.simulation.simulator.protocol.made_files import ardupilot_file
@@ -36,4 +38,10 @@ def _hears(parameters: Parameters, heartbeat: Any) -> bool:
     return heartbeat.get_srcSystem() == parameters["MAV_GCS_SYSID"]
 
 
-ARDUPILOT = Dialect(_parts, MODE_NUMBERS, FIRMWARE, _text, _hears, made_file=ardupilot_file)
+ARDUPILOT = Dialect(
+    _parts,
+    partial(DataflashWriter, mode_numbers=MODE_NUMBERS, version=FIRMWARE),
+    _text,
+    _hears,
+    made_file=ardupilot_file,
+)

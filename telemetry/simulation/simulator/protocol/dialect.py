@@ -10,6 +10,7 @@ from pymavlink.dialects.v20.ardupilotmega import MAVLink_message
 
 from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
 from telemetry.simulation.simulator.autopilot.pilot import Event, Text
+from telemetry.simulation.simulator.own_logs.keeping import MakeWriter
 from telemetry.simulation.simulator.protocol.command_protocol import ReceivedOrder
 from telemetry.simulation.simulator.protocol.item_protocol import Reply
 from telemetry.simulation.simulator.protocol.made_files import MadeFile
@@ -66,8 +67,7 @@ class Parts:
 @dataclass(frozen=True, slots=True)
 class Dialect:
     parts: Callable[[SimulatedVehicle], Parts]
-    mode_numbers: Mapping[str, int]
-    firmware: str
+    log_writer: MakeWriter
     text: Callable[[Text, int], list[MAVLink_message]]
     """The STATUSTEXTs of a text; the number is that of the text."""
     hears: Callable[[Parameters, Any], bool]
@@ -77,7 +77,7 @@ class Dialect:
     unknown_stream: int = 2
     """MAV_RESULT for the rate of a message that it does not have."""
     unknown_message: int = 4
-    keeps_logs: bool = True
-    log_folder: str = "/APM/LOGS"
+    file_sessions: int = 4
+    """That MAVLink FTP may have open at once."""
     made_file: Callable[[Parameters, str], MadeFile | None] = lambda *_: None
     """By its path; None: there is none."""

@@ -1,5 +1,7 @@
-"""The vehicle's files for ground stations, by MAVLink FTP as ArduPilot speaks it: its logs, and what it makes when
-it is read. Nothing is written."""
+"""The vehicle's files for ground stations, by MAVLink FTP: its logs, and what it makes when it is read.
+
+Nothing is written.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +10,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from telemetry.mavlink.logs.ftp.payload import MOST_DATA, NUMBERS, FtpPayload, Nak, Opcode, read_payload
-from telemetry.simulation.simulator.own_log import OwnLogs
+from telemetry.simulation.simulator.own_logs.keeping import OwnLogs
 from telemetry.simulation.simulator.protocol.item_protocol import Reply
 from telemetry.simulation.simulator.protocol.made_files import MadeFile
 
 EVERY_S, BLOCKS = 0.02, 20
 BURST = 100
 """Messages of one burst; then the station asks for the next."""
-MOST_SESSIONS = 4
 
 
 @dataclass(slots=True)
@@ -36,9 +37,11 @@ class _Session:
 
 
 class FileProtocol:
-    def __init__(self, own: OwnLogs, folder: str, made: Callable[[str], MadeFile | None] = lambda _: None) -> None:
-        """``folder``: where the logs lie. ``made``: files that are made when they are opened, by their paths."""
-        self._own, self._folder, self._made = own, folder, made
+    def __init__(
+        self, own: OwnLogs, *, most_sessions: int, made: Callable[[str], MadeFile | None] = lambda _: None
+    ) -> None:
+        """``made``: files that are made when they are opened, by their paths."""
+        self._own, self._most_sessions, self._made = own, most_sessions, made
         self._sessions: dict[tuple[Hashable, int], _Session] = {}
         """By station and the number that it opened the file with."""
         self._last: dict[Hashable, tuple[FtpPayload, FtpPayload]] = {}
@@ -120,13 +123,13 @@ class FileProtocol:
         file = self._file(_path(asked))
         if file is None:
             return _nak(asked, Nak.FILE_NOT_FOUND)
-        if (peer, asked.session) in self._sessions or len(self._sessions) >= MOST_SESSIONS:
+        if (peer, asked.session) in self._sessions or len(self._sessions) >= self._most_sessions:
             return _nak(asked, Nak.NO_SESSIONS_AVAILABLE)
         self._sessions[peer, asked.session] = _Session(peer, to, file.content)
         return _ack(asked, file.said_bytes.to_bytes(4, "little"))
 
     def _file(self, path: str) -> MadeFile | None:
-        log = self._files().get(path)
+        log = self._own.files.get(path)
         return self._made(path) if log is None else MadeFile(bytes(log), len(log))
 
     def _list(self, asked: FtpPayload) -> FtpPayload:
@@ -142,16 +145,16 @@ class FileProtocol:
 
     def _entries(self, folder: str) -> list[bytes] | None:
         """None: there is no such folder."""
-        if folder == self._folder:
-            sizes = {path.rpartition("/")[2]: len(content) for path, content in self._files().items()}
-            return [f"F{name}\t{size}\0".encode() for name, size in sizes.items()]
-        above = f"{folder.rstrip('/')}/"
-        if not self._folder.startswith(above):
-            return None
-        return [f"D{self._folder.removeprefix(above).partition('/')[0]}\0".encode()]
-
-    def _files(self) -> dict[str, bytearray]:
-        return {f"{self._folder}/{number:08d}.BIN": log.content for number, log in enumerate(self._own.logs, start=1)}
+        above, found = f"{folder.rstrip('/')}/", dict[str, bytes]()
+        for path, content in self._own.files.items():
+            if path.startswith(above):
+                name, _, below = path.removeprefix(above).partition("/")
+                found[name] = f"D{name}\0".encode() if below else f"F{name}\t{len(content)}\0".encode()
+        root = f"{self._own.writer.folder}/"
+        if not found and root.startswith(above) and root != above:
+            name = root.removeprefix(above).partition("/")[0]
+            found[name] = f"D{name}\0".encode()
+        return list(found.values()) if found or root == above else None
 
 
 def _path(asked: FtpPayload) -> str:

@@ -1,4 +1,4 @@
-"""The vehicle's logs for ground stations, as ArduPilot hands them out: to one station at a time, and while disarmed."""
+"""The vehicle's logs for ground stations: to one station at a time, and while disarmed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
-from telemetry.simulation.simulator.own_log import OwnLogs
+from telemetry.simulation.simulator.own_logs.keeping import OwnLogs
 from telemetry.simulation.simulator.protocol.item_protocol import Reply
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 
@@ -24,12 +24,14 @@ class LogProtocol:
         self._sent_s = 0.0
 
     def on_message(self, message: Any, peer: Hashable) -> None:
-        kind, count = message.get_type(), len(self._own.logs)
+        kind, numbers = message.get_type(), self._numbers
         if self._vehicle.autopilot.armed:
-            self._vehicle.autopilot.say(3, "Disarm for log download")
+            if words := self._own.writer.words_while_armed:
+                self._vehicle.autopilot.say(3, words)
         elif kind == "LOG_REQUEST_LIST":
-            self._entries = (peer, range(max(1, message.start), min(count, message.end) + 1) if count else range(1))
-        elif kind == "LOG_REQUEST_DATA" and 1 <= message.id <= count and self._is_free_for(peer):
+            wanted = range(max(numbers.start, message.start), min(numbers.stop, message.end + 1))
+            self._entries = (peer, wanted if numbers else range(1))
+        elif kind == "LOG_REQUEST_DATA" and message.id in numbers and self._is_free_for(peer):
             self._data = (peer, message.id, message.ofs, message.count)
         elif kind == "LOG_REQUEST_END" and self._is_free_for(peer):
             self._data = None
@@ -56,18 +58,24 @@ class LogProtocol:
         if self._data is not None and self._data[0] == peer:
             self._data = None
 
+    @property
+    def _numbers(self) -> range:
+        first = self._own.writer.first_number
+        return range(first, first + len(self._own.logs))
+
     def _is_free_for(self, peer: Hashable) -> bool:
         return self._data is None or self._data[0] == peer
 
     def _entry(self, number: int) -> Any:
-        logs = self._own.logs
-        if not number:
+        numbers = self._numbers
+        if number not in numbers:
             return wire.MAVLink_log_entry_message(0, 0, 0, 0, 0)
-        log = logs[number - 1]
-        return wire.MAVLink_log_entry_message(number, len(logs), len(logs), int(log.begun_utc_s), len(log.content))
+        log = self._own.logs[number - numbers.start]
+        begun_utc_s, size = int(log.begun_utc_s), len(log.content)
+        return wire.MAVLink_log_entry_message(number, len(numbers), numbers.stop - 1, begun_utc_s, size)
 
     def _block(self, peer: Hashable, number: int, offset: int, left: int) -> Reply:
-        content = bytes(self._own.logs[number - 1].content[offset : offset + min(BLOCK_BYTES, left)])
+        content = bytes(self._own.logs[number - self._numbers.start].content[offset : offset + min(BLOCK_BYTES, left)])
         goes_on = len(content) == BLOCK_BYTES and left > BLOCK_BYTES
         self._data = (peer, number, offset + BLOCK_BYTES, left - BLOCK_BYTES) if goes_on else None
         padded = list(content.ljust(BLOCK_BYTES, b"\0"))

@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from pymavlink.dialects.v20.ardupilotmega import MAVLink_message
 
 from telemetry.simulation.simulator.autopilot.pilot import Text
-from telemetry.simulation.simulator.own_log import OwnLogs
+from telemetry.simulation.simulator.own_logs.keeping import OwnLogs
 from telemetry.simulation.simulator.protocol.command_protocol import RESULTS, read_order, whole
 from telemetry.simulation.simulator.protocol.dialects import DIALECTS
 from telemetry.simulation.simulator.protocol.file_protocol import FileProtocol
@@ -79,9 +79,10 @@ class Endpoint:
         self._missions, self._parameters = parts.missions, parts.parameters
         self._streams, self._commands = parts.streams, parts.commands
         self._events = parts.events
-        self._own_logs = OwnLogs(vehicle, dialect.mode_numbers, dialect.firmware, are_kept=dialect.keeps_logs)
+        self._own_logs = OwnLogs(vehicle, dialect.log_writer)
         self._logs = LogProtocol(vehicle, self._own_logs)
-        self._files = FileProtocol(self._own_logs, dialect.log_folder, partial(dialect.made_file, vehicle.parameters))
+        made = partial(dialect.made_file, vehicle.parameters)
+        self._files = FileProtocol(self._own_logs, most_sessions=dialect.file_sessions, made=made)
         self._peers: dict[Hashable, _Peer] = {}
         self._news: list[tuple[float, Reply]] = []
         """That the other ground stations have not heard yet, and when they will."""
@@ -243,9 +244,9 @@ class Endpoint:
         out: list[Reply] = []
         self._own_logs.look()
         for event in self._pilot.take_events():
+            self._own_logs.on_event(event)
             messages = self._streams.on_event(event)
             if isinstance(event, Text):
-                self._own_logs.on_text(event.text)
                 self._texts += 1
                 messages = self._dialect.text(event, self._texts)
                 messages += self._events.on_text(event) if self._events is not None else []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
@@ -10,14 +11,14 @@ from pymavlink.dialects.v20.ardupilotmega import MAVLink_message
 from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
 from telemetry.simulation.simulator.autopilot.pilot import Text
 from telemetry.simulation.simulator.autopilot.px4.px4_autopilot import Px4Pilot
+from telemetry.simulation.simulator.own_logs.ulog_writing import UlogWriter
 from telemetry.simulation.simulator.protocol.dialect import Dialect, Parts
 from telemetry.simulation.simulator.protocol.px4.px4_commands import Px4Commands
 from telemetry.simulation.simulator.protocol.px4.px4_events import Px4Events
 from telemetry.simulation.simulator.protocol.px4.px4_metadata import px4_file
 from telemetry.simulation.simulator.protocol.px4.px4_missions import Px4Missions
-from telemetry.simulation.simulator.protocol.px4.px4_numbers import MODE_NUMBERS
 from telemetry.simulation.simulator.protocol.px4.px4_parameters_on_wire import Px4ParametersOnWire
-from telemetry.simulation.simulator.protocol.px4.px4_streams import FIRMWARE, UNASKED_HZ, Px4Streams
+from telemetry.simulation.simulator.protocol.px4.px4_streams import FIRMWARE_VERSION, UNASKED_HZ, Px4Streams
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 
 TEXT_BYTES = 50
@@ -45,15 +46,13 @@ def _hears(_: Parameters, heartbeat: Any) -> bool:
 
 PX4 = Dialect(
     _parts,
-    MODE_NUMBERS,
-    FIRMWARE,
+    partial(UlogWriter, version=FIRMWARE_VERSION),
     _text,
     _hears,
     UNASKED_HZ,
     timesync_s=2.0,
     unknown_stream=FAILED,
     unknown_message=DENIED,
-    keeps_logs=False,
-    log_folder="/fs/microsd/log",
+    file_sessions=1,
     made_file=px4_file,
 )
