@@ -42,6 +42,18 @@ class Braking:
         return ramp_m + steady_m + fading_m_s * tau
 
 
+PX4_HOLD = Braking(decel_m_s2=2.6, jerk_m_s3=1.5)
+"""No shorter than PX4's HOLD with its default parameters (MPC_ACC_HOR 3, MPC_JERK_AUTO 4), and at most 1 m longer up
+to 10 m/s: of the simulated PX4, which needs 1.9, 3.8, 6.0, 8.6, 11.4, 15.1 and 21.5 m from 1 to 5, 6.2 and 8 m/s."""
+_COMPARED_M_S = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0)
+
+
+def no_shorter(claimed: Braking, known: Braking) -> Braking:
+    """``claimed``, unless it stops sooner than what is ``known`` at any speed."""
+    is_shorter = any(claimed.distance_m(speed) < known.distance_m(speed) for speed in _COMPARED_M_S)
+    return known if is_shorter else claimed
+
+
 @dataclass(frozen=True, slots=True)
 class Stopping:
     """From the first moment that something stands in a region until the vehicle stands before it."""

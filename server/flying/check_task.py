@@ -28,6 +28,7 @@ from server.library.seen_columns import check_home_stands_on_ground, load_planne
 from server.library.shelf import utc_now
 from server.schemas import CheckRow, PlanDoc, PreflightDoc
 from server.work.jobs import Progress
+from telemetry.flight.avoidance.regions import braking_of
 from telemetry.topics.messages import PlanRecord
 from telemetry.topics.onboard_lists import Item, OnboardMission, PlacesOnboard
 from telemetry.topics.vehicle import VehicleState
@@ -109,7 +110,7 @@ def check_start(
     certificate = "" if found.certificate is None else json.dumps(certificate_json(found.certificate), allow_nan=False)
     moved = _moved(found, record, state, dsm) if found.needs_rereference and rereferenced_m is None else None
     speeds = flown_speeds(parameters, onboard, record.firmware)
-    braking = Braking(profile.brake_decel_m_s2, profile.brake_jerk_m_s3)
+    braking = braking_of(record.firmware, profile.brake_decel_m_s2, profile.brake_jerk_m_s3)
     return Checked(
         _doc(found, rereferenced_m),
         certificate,

@@ -31,6 +31,7 @@ from server.schemas import (
 from server.work.jobs import Lane
 from telemetry.bus.bus import Bus
 from telemetry.bus.link_client import LinkClient
+from telemetry.flight.avoidance.regions import braking_of
 from telemetry.perception.sensor_kinds import check_memory, check_perception
 from telemetry.topics.messages import LinkStatus, PlanRecord, Topic
 from telemetry.topics.obstacles import MAP_NAMES, MapName, PerceptionSettings, sensor_of
@@ -82,7 +83,8 @@ class ObstacleDesk:
         except PlanningError as error:
             log.warning("How the vehicle brakes: %s", reported(error, log, "Reading the plan's profile").what)
             return
-        brakes = {"brake_decel_m_s2": profile.brake_decel_m_s2, "brake_jerk_m_s3": profile.brake_jerk_m_s3}
+        braking = braking_of(record.firmware, profile.brake_decel_m_s2, profile.brake_jerk_m_s3)
+        brakes = {"brake_decel_m_s2": braking.decel_m_s2, "brake_jerk_m_s3": braking.jerk_m_s3}
         self._kept = replace(self._kept, **brakes)
         self._set(replace(self._live.settings, **brakes))
 

@@ -6,6 +6,7 @@ import contextlib
 import time
 from collections.abc import Callable
 
+from planning.basics.plan_model import Firmware
 from telemetry.errors import NotAllowedError, SilentError
 from telemetry.flight.avoidance.avoiding import Avoiding
 from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_from
@@ -19,6 +20,7 @@ from telemetry.topics.requests import FlyManoeuvre, FlyRest
 from telemetry.topics.tracks import TracksStatus
 from telemetry.topics.vehicle import VehicleState
 
+BUILT_FOR = ("ardupilot", "px4")
 WHO_IT_IS_S = 3.0
 """A vehicle that was just adopted is waited for so long to say what it is."""
 
@@ -36,7 +38,12 @@ class Avoidance:
     ) -> None:
         self._vehicle = vehicle
         self._avoiding = Avoiding(
-            vehicle.target, remaining=remaining, fence=vehicle.onboard.fence, on_engage=on_engage, on_end=on_end
+            vehicle.target,
+            remaining=remaining,
+            fence=vehicle.onboard.fence,
+            firmware=vehicle.firmware,
+            on_engage=on_engage,
+            on_end=on_end,
         )
 
     @property
@@ -64,8 +71,9 @@ class Avoidance:
     # Requests.
 
     def check_autopilot(self) -> None:
-        if self._vehicle.state.autopilot != "ardupilot":
-            raise NotAllowedError("Avoidance is built for ArduPilot only.", advice="Watch the alerts and fly by hand.")
+        if self._vehicle.state.autopilot not in BUILT_FOR:
+            what = "Avoidance is built for ArduPilot and PX4 only."
+            raise NotAllowedError(what, advice="Watch the alerts and fly by hand.")
 
     async def check_may_be_enabled(self, *, consent: bool) -> None:
         """Raises NotAllowedError: a vehicle that is no simulation climbs by itself only if its operator wants it."""
@@ -110,11 +118,12 @@ class Avoidance:
     # What comes in.
 
     def on_order(self, message: Message) -> None:
-        """What this link sends: a mode that it asks for is no pilot's."""
+        """What this link sends: a mode that it asks for is no pilot's. A place in the mode that shows changes none."""
         state = self._vehicle.state
         mode = commanded_mode(message, state.autopilot, state.vehicle_type)
-        if mode is not None:
-            self._avoiding.commanded(mode, time.monotonic())
+        if mode is None or (message.get_type() == "COMMAND_INT" and mode == state.mode):
+            return
+        self._avoiding.commanded(mode, time.monotonic())
 
     def on_message(self, message: Message) -> None:
         self._perform(self._avoiding.on_message(message, time.monotonic()))
@@ -141,7 +150,12 @@ class Avoidance:
 
 
 def remaining_after(
-    request: FlyManoeuvre, remaining: RemainingMission | None, onboard: OnboardMission | None, *, flies_way: bool
+    request: FlyManoeuvre,
+    remaining: RemainingMission | None,
+    onboard: OnboardMission | None,
+    firmware: Firmware,
+    *,
+    flies_way: bool,
 ) -> RemainingMission:
     """What is flown after the way past an obstacle, of what was under way, else of the mission on board.
 
@@ -156,7 +170,7 @@ def remaining_after(
         raise NotAllowedError(what, advice="Hold, then ask for another way.")
     if remaining is not None:
         return RemainingMission(tuple(t for t in remaining.targets if t.item >= item), remaining.end, remaining.way)
-    remaining = None if onboard is None else remaining_from(onboard, item)
+    remaining = None if onboard is None else remaining_from(onboard, item, firmware)
     if remaining is None:
         what = f"What follows from item {item} on cannot be flown in GUIDED."
         raise NotAllowedError(what, advice="Pause, and fly past the obstacle by hand.")

@@ -316,8 +316,8 @@ class Pilot:
         remaining = self.avoidance.remaining
         if remaining is None and self.script_flies and self.script is not None:
             remaining = RemainingMission(self.script.left, self.script.end, "guided")
-        flies_way = self._most_m_s is not None
-        return remaining_after(request, remaining, self.vehicle.onboard.mission, flies_way=flies_way)
+        onboard, firmware = self.vehicle.onboard.mission, self.vehicle.firmware
+        return remaining_after(request, remaining, onboard, firmware, flies_way=self._most_m_s is not None)
 
     def _yield_to_avoidance(self) -> None:
         """What is under way sends nothing any more."""

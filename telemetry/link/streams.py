@@ -35,6 +35,7 @@ FAST_HZ: dict[str, float] = {
     "WIND_COV": 1,
     "FENCE_STATUS": 1,
     "HOME_POSITION": 0.5,
+    "POSITION_TARGET_GLOBAL_INT": 4,
     "OBSTACLE_DISTANCE": 5,
     "DISTANCE_SENSOR": 5,
 }
@@ -49,6 +50,7 @@ _OWN_KIND = {
     "WIND": "ardupilot",
     "ESTIMATOR_STATUS": "px4",
     "WIND_COV": "px4",
+    "POSITION_TARGET_GLOBAL_INT": "px4",
 }
 _IDS: dict[str, int] = {kind.msgname: number for number, kind in mavlink.mavlink_map.items()}
 _OLD_STREAMS = ((2, 2), (6, 20), (10, 20), (11, 4), (3, 1), (12, 1))

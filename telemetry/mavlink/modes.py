@@ -64,13 +64,12 @@ def mode_numbers(autopilot: Autopilot, name: str) -> ModeNumbers | None:
 
 def commanded_mode(message: Any, autopilot: Autopilot, vehicle_type: int) -> str | None:
     """The flight mode that a message to the vehicle changes to, None for one that changes none."""
-    kind = message.get_type()
-    if kind == "COMMAND_INT":
-        return "GUIDED" if message.command == mavlink.MAV_CMD_DO_REPOSITION else None
-    if kind != "COMMAND_LONG":
+    if message.get_type() not in ("COMMAND_INT", "COMMAND_LONG"):
         return None
+    if message.command == mavlink.MAV_CMD_DO_REPOSITION:
+        return "HOLD" if autopilot == "px4" else "GUIDED"
     if message.command == mavlink.MAV_CMD_MISSION_START:
-        return "AUTO"
+        return "MISSION" if autopilot == "px4" else "AUTO"
     if message.command != mavlink.MAV_CMD_DO_SET_MODE:
         return None
     main, sub = int(message.param2), int(message.param3)

@@ -78,7 +78,7 @@ class Craft:
     """Of the mission."""
 
     def __init__(self, items: tuple[Item, ...], walls: list[Wall], senses: list[Sense] | None = None) -> None:
-        self.bench = Bench(heartbeat=True)
+        self.bench = self.made()
         self.walls = walls
         self.senses = [Sense("vision", 7.0, 0.2)] if senses is None else senses
         self.onboard = OnboardMission(items, HOME.lat_deg, HOME.lon_deg, HOME.alt_amsl_m, "digest")
@@ -92,6 +92,9 @@ class Craft:
         self._ticks = 0
         for name, rate_hz in ((33, 20), (30, 20), (42, 4), (245, 4), (242, 0.5)):
             self.bench.stream(name, rate_hz)
+
+    def made(self) -> Bench:
+        return Bench(heartbeat=True)
 
     def _remaining(self, state: VehicleState) -> RemainingMission | None:
         return remaining_flight(self.onboard, state)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from mapping.perceiving.braking import Braking
 from telemetry.errors import NotAllowedError
 from telemetry.flight.avoidance.coming_down import joined
 from telemetry.topics.requests import FlyRest
@@ -66,13 +67,13 @@ def test_it_is_refused_where_nothing_is_flown_higher_where_the_line_is_another_a
 def test_the_join_is_a_stop_ahead_and_never_below_the_line_that_was_certified() -> None:
     it = higher()
     at = replace(it.state, lat_deg=HOME.lat_deg + 31 / NORTH_PER_DEG, lon_deg=HOME.lon_deg, ground_speed_m_s=0.0)
-    over, low, *rest = joined(REST, replace(at, alt_rel_home_m=20.0))
+    over, low, *rest = joined(REST, replace(at, alt_rel_home_m=20.0), Braking())
     assert over.alt_rel_home_m == 20.0
     assert low.alt_rel_home_m == pytest.approx(13.0, abs=0.1)
     assert rest == list(REST[1:])
-    over, low, *rest = joined(REST, replace(at, alt_rel_home_m=20.0, ground_speed_m_s=3.0))
+    over, low, *rest = joined(REST, replace(at, alt_rel_home_m=20.0, ground_speed_m_s=3.0), Braking())
     assert low.alt_rel_home_m == pytest.approx(9.0, abs=0.2)
-    over, low, *_ = joined(REST, replace(at, alt_rel_home_m=10.0))
+    over, low, *_ = joined(REST, replace(at, alt_rel_home_m=10.0), Braking())
     assert over.alt_rel_home_m == low.alt_rel_home_m, "lower than the line it climbs first"
     with pytest.raises(NotAllowedError, match="almost flown"):
-        joined(REST, replace(at, lat_deg=HOME.lat_deg + 59 / NORTH_PER_DEG, ground_speed_m_s=3.0))
+        joined(REST, replace(at, lat_deg=HOME.lat_deg + 59 / NORTH_PER_DEG, ground_speed_m_s=3.0), Braking())

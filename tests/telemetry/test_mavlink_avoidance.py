@@ -117,8 +117,8 @@ def test_other_autopilots_are_refused() -> None:
         async with simulated(speedup=1.0) as (bench, _):
             assert bench.pilot is not None
             vehicle: Any = bench.vehicle
-            vehicle.state = type(vehicle.state)(1, 1, autopilot="px4")
-            with pytest.raises(NotAllowedError, match="ArduPilot only"):
+            vehicle.state = type(vehicle.state)(1, 1, autopilot="other")
+            with pytest.raises(NotAllowedError, match="ArduPilot and PX4 only"):
                 bench.pilot.avoidance.check_autopilot()
 
     run(whole)

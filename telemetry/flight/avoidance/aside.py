@@ -25,7 +25,7 @@ from telemetry.flight.avoidance.passing_tracks import (
     velocity_of,
     velocity_past,
 )
-from telemetry.flight.guided.helm import GUIDED, Helm, here_of, moved
+from telemetry.flight.guided.helm import Helm, here_of, moved
 from telemetry.mavlink.actions import Action
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.obstacles import PerceptionSettings
@@ -183,7 +183,7 @@ class Aside:
         self.why, self._free_since_s, self._sent = why, None, None
         if self._stands_since_s is None:
             self._stands_since_s = now_s
-        if state.mode != GUIDED or not self.sees(now_s):
+        if state.mode != self._helm.guided_mode or not self.sees(now_s):
             return self._helm.stop(now_s)
         return self._helm.stop_in_guided(state, now_s, radius_m=LEAST_LEAD_M) if is_new else []
 
@@ -193,15 +193,16 @@ class Aside:
         assert state.lon_deg is not None
         here, velocity = (state.lat_deg, state.lon_deg), velocity_of(state)
         speed_m_s = math.hypot(*velocity)
-        stops = _with_speed(velocity, Braking().distance_m(speed_m_s))
+        braking = Braking(self.settings.brake_decel_m_s2, self.settings.brake_jerk_m_s3)
+        stops = _with_speed(velocity, braking.distance_m(speed_m_s))
         places = [moved_deg(here, float(east_m), float(north_m)) for east_m, north_m in (stops, offset)]
         return self._fence.why_not(here, (here, *places))
 
     def _go(
         self, state: VehicleState, offset: F64, carrot_m: float, found: Proposal, *, on_line: bool, now_s: float
     ) -> list[Action]:
-        if state.mode != GUIDED:
-            return self._helm.change_mode(GUIDED, now_s)
+        if state.mode != self._helm.guided_mode:
+            return self._helm.change_mode(self._helm.guided_mode, now_s)
         speed_m_s, at = math.hypot(*found.velocity_enu_m_s), self._at(state)
         sent_m = self._sent[2] if self._sent and not on_line else -math.inf
         up_m = max(carrot_m, state.alt_rel_home_m or 0.0, sent_m)

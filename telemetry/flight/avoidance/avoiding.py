@@ -9,16 +9,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
+from planning.basics.plan_model import Firmware
 from telemetry.errors import NotAllowedError
 from telemetry.flight.avoidance.avoiding_words import Now, status_of
 from telemetry.flight.avoidance.coming_down import joined
 from telemetry.flight.avoidance.detour import Detour, DetourParams
 from telemetry.flight.avoidance.fence_aboard import FenceAboard
 from telemetry.flight.avoidance.pilot_watch import PilotWatch
-from telemetry.flight.avoidance.regions import FASTER_M_S, Regions, Sight, largest_speed
-from telemetry.flight.guided.helm import GUIDED, STOP_MODES, Helm
-from telemetry.flight.guided.remaining_mission import RETURNS, RemainingMission
+from telemetry.flight.avoidance.regions import FASTER_M_S, Regions, Sight, braking_of, largest_speed
+from telemetry.flight.guided.helm import Helm
+from telemetry.flight.guided.remaining_mission import RemainingMission
 from telemetry.mavlink.actions import Action, Message
 from telemetry.mavlink.conversation import GROUND_STATION
 from telemetry.topics.messages import FlightStatus, GuidedTarget
@@ -30,14 +32,12 @@ from telemetry.topics.vehicle import VehicleState
 LOW_M = 1.0
 SHORT_M = 1.0
 """Left between the vehicle's hull and what it stops short of."""
-FLOWN_FROM = frozenset({"AUTO", *STOP_MODES, *RETURNS})
-"""Modes in which no pilot flies by hand."""
 AGAIN_S = 2.0
 """A vehicle that is still too fast, or again because its mission says so, is told once more."""
 
 
 class Avoiding:
-    """Of one ArduPilot multirotor. All methods return what is to be sent to it, at once and in this order.
+    """Of one multirotor. All methods return what is to be sent to it, at once and in this order.
 
     ``remaining``: what is left of the flight, None when nothing is flown that could be gone on with. ``now_s`` is the
     clock of ``t_mono_s`` in states and perception. ``fence``: what is known of the one on board. ``on_engage`` is
@@ -52,19 +52,22 @@ class Avoiding:
         settings: PerceptionSettings | None = None,
         params: DetourParams | None = None,
         fence: FenceAboard | None = None,
+        firmware: Firmware = "ardupilot",
         own: tuple[int, int] = GROUND_STATION,
         on_engage: Callable[[], None] = lambda: None,
         on_end: Callable[[], None] = lambda: None,
     ) -> None:
-        settings = settings or PerceptionSettings()
+        self._firmware: Firmware = firmware
+        settings = self._braking_as_it_does(settings or PerceptionSettings())
         self._params, self._remaining = params or DetourParams().following(settings), remaining
         self._on_engage, self._on_end = on_engage, on_end
         self._watch = PilotWatch()
         self.regions = Regions(settings)
-        self._helm = Helm(target, self._watch.asked, own=own)
+        self._helm = Helm(target, self._watch.asked, firmware=firmware, own=own)
         self.fence = fence or FenceAboard()
         self.fence.margin_m = settings.vehicle_radius_m + settings.position_error_m
         self.detour = Detour(self._helm, self.regions, self._params, self.fence)
+        self.detour.aside.settings = settings
         self._state: VehicleState | None = None
         self.enabled = False
         self.by: AvoidBy = "climb"
@@ -148,7 +151,7 @@ class Avoiding:
             raise NotAllowedError(why, advice="Fly another way, or return.")
         if self.released:
             raise NotAllowedError(self.released, advice="The pilot flies the vehicle.")
-        if state.mode not in FLOWN_FROM:
+        if state.mode not in self._helm.orders.flown_from:
             raise NotAllowedError(f"The vehicle is flown in {state.mode}, by hand.", advice="Pause it first.")
         if not self.enabled and not self.is_engaged:
             self._watch.begin()  # what anybody did before this order releases nothing
@@ -167,7 +170,7 @@ class Avoiding:
             raise NotAllowedError("No flight goes on higher than planned.", advice="Nothing is to be done.")
         if self.regions.occupied(now_s) or not self.regions.fresh(now_s):
             raise NotAllowedError("The way ahead is not seen to be clear.", advice="It is planned again.")
-        targets = joined(request.targets, state)
+        targets = joined(request.targets, state, self.regions.braking)
         if why := self.fence.why_not_along(state, targets):
             raise NotAllowedError(f"The lower line is not flown. {why}", advice="It stays higher.")
         return detour.come_down(targets, state, now_s)
@@ -198,10 +201,15 @@ class Avoiding:
         self._watch.asked(mode, now_s)
 
     def on_settings(self, settings: PerceptionSettings) -> None:
+        settings = self._braking_as_it_does(settings)
         self._params = self._params.following(settings)
         self.detour.set_params(self._params)
         self.regions.settings = self.detour.aside.settings = settings
         self.fence.margin_m = settings.vehicle_radius_m + settings.position_error_m
+
+    def _braking_as_it_does(self, settings: PerceptionSettings) -> PerceptionSettings:
+        braking = braking_of(self._firmware, settings.brake_decel_m_s2, settings.brake_jerk_m_s3)
+        return replace(settings, brake_decel_m_s2=braking.decel_m_s2, brake_jerk_m_s3=braking.jerk_m_s3)
 
     def on_message(self, message: Message, now_s: float) -> list[Action]:
         """Any of the vehicle, and those by which others fly it by hand."""
@@ -212,7 +220,7 @@ class Avoiding:
         self._state = state
         self._slowing.on_state(state)
         self.detour.trail.on_state(state)
-        if self.released and state.mode != GUIDED:
+        if self.released and state.mode != self._helm.guided_mode:
             self._helm.let_go()
         if _is_flying(state):
             self._watch.on_state(state, now_s)
@@ -316,7 +324,7 @@ class Avoiding:
     def _slow_down(self, state: VehicleState, now_s: float) -> list[Action]:
         """What is flown by no pilot: the mission, the script, the way home."""
         largest_m_s = self.largest_speed_m_s(now_s)
-        if largest_m_s is None or not _is_flying(state) or state.mode not in (GUIDED, *FLOWN_FROM):
+        if largest_m_s is None or not _is_flying(state) or state.mode not in self._helm.orders.flown_from:
             return []
         return self._slowing.look(state, largest_m_s, now_s)
 
@@ -335,7 +343,7 @@ class Avoiding:
         self.released = self._watch.words
         was_engaged = self.is_engaged
         self.stop()
-        return self._helm.stop(now_s) if was_engaged and state.mode == GUIDED else []
+        return self._helm.stop(now_s) if was_engaged and state.mode == self._helm.guided_mode else []
 
 
 class Slowing:

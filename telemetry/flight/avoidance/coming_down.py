@@ -16,7 +16,7 @@ BESIDE_M = 3.0
 """Farther from the line than this it is another flight's."""
 
 
-def joined(targets: tuple[GuidedTarget, ...], state: VehicleState) -> tuple[GuidedTarget, ...]:
+def joined(targets: tuple[GuidedTarget, ...], state: VehicleState, braking: Braking) -> tuple[GuidedTarget, ...]:
     """What is left of the line, joined as far ahead as the vehicle needs to stop: it descends over one place only.
 
     Straight down onto a line that is clear everything is clear: what stands is widest at its foot. Raises
@@ -30,7 +30,7 @@ def joined(targets: tuple[GuidedTarget, ...], state: VehicleState) -> tuple[Guid
     if away_m > BESIDE_M:
         what = f"The vehicle is {away_m:.0f} m beside the line that was planned for it."
         raise NotAllowedError(what, advice="It is planned again.")
-    leg, share = _at(places, along_m + Braking().distance_m(state.ground_speed_m_s or 0.0))
+    leg, share = _at(places, along_m + braking.distance_m(state.ground_speed_m_s or 0.0))
     if leg is None:
         raise NotAllowedError("The line that was planned is almost flown.", advice="It stays higher.")
     a, b = targets[leg], targets[leg + 1]

@@ -26,7 +26,7 @@ from telemetry.flight.avoidance.phases import (
 )
 from telemetry.flight.avoidance.regions import Regions
 from telemetry.flight.avoidance.trusted_sensors import TrustedSensors
-from telemetry.flight.guided.helm import GUIDED, Helm
+from telemetry.flight.guided.helm import Helm
 from telemetry.flight.guided.legs import Legs
 from telemetry.flight.guided.remaining_mission import RemainingMission
 from telemetry.mavlink.actions import Action
@@ -160,7 +160,7 @@ class Detour:
         self._plan_m, self._legs = None, Legs(self._helm, places)
         self._then, self._paused = "go", False
         self._enter("sidestep ordered")
-        return self._helm.change_mode(GUIDED, now_s)
+        return self._helm.change_mode(self._helm.guided_mode, now_s)
 
     def step_aside(self, state: VehicleState, remaining: RemainingMission, now_s: float) -> list[Action]:
         """Past what the tracks say, along the rest of the flight and back onto its line."""
@@ -177,7 +177,7 @@ class Detour:
         if not self._enter("no way past"):
             return []
         self.aside.give_up(now_s)
-        return [*self._helm.change_mode(GUIDED, now_s), *self._hand_over(state, now_s)]
+        return [*self._helm.change_mode(self._helm.guided_mode, now_s), *self._hand_over(state, now_s)]
 
     def come_down(self, targets: tuple[GuidedTarget, ...], state: VehicleState, now_s: float) -> list[Action]:
         """The rest at heights of its own, which are certified past what was seen."""
@@ -279,7 +279,7 @@ class Detour:
         return bool(self._helm.failed) and is_back and not self._stands(state, now_s)
 
     def _is_not_guided(self, state: VehicleState, _: float) -> bool:
-        return state.mode != GUIDED
+        return state.mode != self._helm.guided_mode
 
     def _goes_on_at_once(self, _: VehicleState, __: float) -> bool:
         return self._then == "go"
@@ -344,7 +344,7 @@ class Detour:
         return self._helm.stop(now_s)
 
     def _guide(self, _: VehicleState, now_s: float) -> list[Action]:
-        return self._helm.change_mode(GUIDED, now_s)
+        return self._helm.change_mode(self._helm.guided_mode, now_s)
 
     def _go(self, state: VehicleState, now_s: float) -> list[Action]:
         if self._legs is None:

@@ -54,7 +54,7 @@ class PilotWatch:
         before, self._mode = self._mode, state.mode
         if before is None or state.mode == before:
             return
-        if self._was_expected(state.mode, now_s) or self.words:
+        if self._was_expected(state.mode, now_s) or self.words or _is_its_own(before, state):
             return
         if state.critical:
             self.words = f"The vehicle has changed to {state.mode} by itself: a failsafe is active."
@@ -81,6 +81,17 @@ class PilotWatch:
             self._sticks_us = sticks_us
         elif any(abs(now - then) > STICK_US for now, then in zip(sticks_us, self._sticks_us, strict=True)):
             self.words = self.words or "A stick was moved: the pilot took over."
+
+
+def _is_its_own(before: str, state: VehicleState) -> bool:
+    """PX4 leaves its mission, once all of it is flown, for RTL or HOLD, and its take-off for HOLD."""
+    if state.autopilot != "px4":
+        return False
+    items, reached = state.mission_items, state.mission_reached
+    is_flown = items is not None and reached is not None and reached >= items - 1
+    return (before == "MISSION" and is_flown and state.mode in ("RTL", "HOLD")) or (
+        before == "TAKEOFF" and state.mode == "HOLD"
+    )
 
 
 def _is_used(message: Message) -> bool:

@@ -7,7 +7,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from mapping.perceiving.braking import Braking, Stopping
+from mapping.perceiving.braking import PX4_HOLD, Braking, Stopping, no_shorter
+from planning.basics.plan_model import Firmware
 from telemetry.topics.obstacles import PerceptionSettings, PerceptionStatus, Sensor
 
 SENSOR_WORDS: dict[Sensor, str] = {"radar": "radar", "vision": "vision", "ranges": "range sensors"}
@@ -82,6 +83,12 @@ def stopping_of(settings: PerceptionSettings, sensor: Sensor, *, latency_s: floa
     )
 
 
+def braking_of(firmware: Firmware, decel_m_s2: float, jerk_m_s3: float) -> Braking:
+    """As the vehicle's profile says; a PX4 is not believed to stop sooner than PX4 does by itself."""
+    said = Braking(decel_m_s2, jerk_m_s3)
+    return no_shorter(said, PX4_HOLD) if firmware == "px4" else said
+
+
 def sees_enough_for(settings: PerceptionSettings, sensor: Sensor) -> float:
     """The speed from which a vehicle can stop in a sensor's region, before any frame has told how late it is."""
     usual = stopping_of(settings, sensor, latency_s=LEAST_LATENCY_S + USUAL_PERIOD_S[sensor])
@@ -99,6 +106,10 @@ class Regions:
     def __init__(self, settings: PerceptionSettings) -> None:
         self.settings = settings
         self.sights: dict[Sensor, Sight] = {}
+
+    @property
+    def braking(self) -> Braking:
+        return Braking(self.settings.brake_decel_m_s2, self.settings.brake_jerk_m_s3)
 
     def take(self, status: PerceptionStatus) -> None:
         """Frames that come late or twice change nothing, nor does one that was refused or does not look ahead."""

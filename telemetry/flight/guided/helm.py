@@ -1,4 +1,7 @@
-"""Steers an ArduPilot multirotor in flight: stop, take over in GUIDED, go to a place. One order at a time, sans-IO."""
+"""Steers a multirotor in flight: stop, take over, go to a place. One order at a time, sans-IO.
+
+ArduPilot goes to places in GUIDED and stops in BRAKE; PX4 does both in HOLD.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from mapping.geometry.frames import moved_deg
+from planning.basics.plan_model import Firmware
 from telemetry.errors import RefusedError, TelemetryError
 from telemetry.flight.guided.handover import Handover, is_fresh
 from telemetry.flight.guided.orders import GROUND_SPEED, GuidedOrders, Place
@@ -15,9 +19,6 @@ from telemetry.mavlink.actions import Action, Message, Send
 from telemetry.mavlink.conversation import GROUND_STATION, Endpoints
 from telemetry.topics.vehicle import VehicleState
 
-STOP_MODES = ("BRAKE", "GUIDED")
-"""In order of preference; a change to GUIDED stops the vehicle too, unless it is in GUIDED already."""
-GUIDED = "GUIDED"
 STANDS_M_S = 0.4
 MODE_SHOWS_S = 3.0
 FALLBACK_DECEL_M_S2 = 1.5
@@ -31,9 +32,10 @@ class Helm:
         target: tuple[int, int],
         asked: Callable[[str, float], None],
         *,
+        firmware: Firmware = "ardupilot",
         own: tuple[int, int] = GROUND_STATION,
     ) -> None:
-        self._endpoints, self.orders = Endpoints(target, own), GuidedOrders("ardupilot", target)
+        self._endpoints, self.orders = Endpoints(target, own), GuidedOrders(firmware, target)
         self._asked = asked
         self._pending = PendingCommand(self._endpoints, self._on_failed)
         self._mode, self._mode_s = "", 0.0
@@ -43,9 +45,16 @@ class Helm:
         self._speed: tuple[float, float] | None = None
         self._is_placed = False
         """A place was sent in this mode."""
+        self._stops = False
+        """It was ordered to, and nothing else since."""
         self.failed = ""
         self.most_m_s = math.inf
         """Over ground, whatever is asked for."""
+
+    @property
+    def guided_mode(self) -> str:
+        """In which it goes where it is sent."""
+        return self.orders.guided_mode
 
     @property
     def place(self) -> Place | None:
@@ -56,7 +65,7 @@ class Helm:
         """Nothing more is sent."""
         self._pending = PendingCommand(self._endpoints, self._on_failed)
         self._handover, self._mode, self._speed, self.failed = None, "", None, ""
-        self._is_placed = False
+        self._is_placed = self._stops = False
 
     # What comes in.
 
@@ -79,17 +88,25 @@ class Helm:
     def stop(self, now_s: float) -> list[Action]:
         """Brakes and holds."""
         self._handover, self.failed = None, ""
-        return self.change_mode(STOP_MODES[0], now_s)
+        mode, again = self.orders.stop_modes[0], self._stops
+        self._stops = True
+        is_in_it = self._mode == mode or (self._state is not None and self._state.mode == mode)
+        if not (self.orders.holds_where_it_is_guided and is_in_it):
+            return self.change_mode(mode, now_s)
+        self._mode = mode
+        return [] if again else self._pending.begin(self.orders.pause(), now_s)
 
     def stop_in_guided(self, state: VehicleState, now_s: float, *, radius_m: float = 1.0) -> list[Action]:
-        """The same without leaving GUIDED: it is sent to where it can stand still."""
+        """The same without leaving the mode: ArduPilot is sent to where it can stand still."""
+        if self.orders.holds_where_it_is_guided:
+            return self.stop(now_s)
         return self.go_to(stopping_place(state), now_s, radius_m=radius_m, holds=True)
 
     def change_mode(self, mode: str, now_s: float, *, then: Then | None = None) -> list[Action]:
         """Nothing when it has been commanded already."""
         if self._mode == mode:
             return []
-        self._mode = mode
+        self._mode, self._stops = mode, self._stops and mode == self.orders.stop_modes[0]
         return self._command_mode(now_s, then)
 
     def _command_mode(self, now_s: float, then: Then | None = None) -> list[Action]:
@@ -100,7 +117,8 @@ class Helm:
         return self._pending.begin(message, now_s, confirm=lambda state: state.mode == mode, then=then)
 
     def go_to(self, place: Place, now_s: float, *, radius_m: float, holds: bool = False) -> list[Action]:
-        """In GUIDED."""
+        """In the mode for it."""
+        self._stops = False
         self._handover = Handover(place, radius_m=radius_m, holds=holds)
         return self._send_place(now_s)
 
@@ -112,7 +130,7 @@ class Helm:
         if self._speed == (kind, speed_m_s):
             return []
         self._speed = (kind, speed_m_s)
-        return [] if self._mode == GUIDED and not self._is_placed else self._order_speed(now_s)
+        return [] if self._mode == self.guided_mode and not self._is_placed else self._order_speed(now_s)
 
     def _order_speed(self, now_s: float) -> list[Action]:
         assert self._speed is not None
@@ -130,10 +148,11 @@ class Helm:
 
     def has_stopped(self, state: VehicleState, now_s: float) -> bool:
         """In the mode that was commanded for it: one that was standing in GUIDED already is not stopped before BRAKE
-        shows, or whatever is ordered next would be undone by it."""
+        shows, or whatever is ordered next would be undone by it. Where no mode shows it, the order must be answered."""
         speed_m_s = math.hypot(state.ground_speed_m_s or 0.0, state.climb_m_s or 0.0)
-        shows = state.mode in STOP_MODES and self._mode in ("", state.mode)
-        return shows and is_fresh(state, now_s) and speed_m_s <= STANDS_M_S
+        shows = state.mode in self.orders.stop_modes and self._mode in ("", state.mode)
+        waits = self.orders.holds_where_it_is_guided and self._stops and self._pending.is_under_way
+        return shows and not waits and is_fresh(state, now_s) and speed_m_s <= STANDS_M_S
 
     def has_arrived(self, state: VehicleState, now_s: float) -> bool:
         return self._handover is not None and self._handover.has_arrived(state, now_s)
@@ -145,8 +164,10 @@ class Helm:
         return [] if shows or waits else self._command_mode(now_s)
 
     def _again_if_needed(self, now_s: float) -> list[Action]:
-        if self._handover is None or self._state is None or self._state.mode != GUIDED:
+        if self._handover is None or self._state is None or self._state.mode != self.guided_mode:
             return []
+        if self.orders.counts_from_sea and self._handover.follow_home(here_of(self._state).home_alt_amsl_m):
+            return self._send_place(now_s)
         return self._send_place(now_s) if self._handover.must_be_sent_again(self._state, now_s) else []
 
     def _send_place(self, now_s: float) -> list[Action]:
@@ -158,17 +179,17 @@ class Helm:
         return [Send(self.orders.go_to(self._handover.place)), *speed]
 
     def _on_failed(self, error: TelemetryError, now_s: float) -> list[Action]:
-        mode, self._mode, self._speed = self._mode, "", None
-        if mode == STOP_MODES[0] and isinstance(error, RefusedError):
+        mode, self._mode, self._speed, self._stops = self._mode, "", None, False
+        if mode == "BRAKE" and isinstance(error, RefusedError):
             return self._stop_without_brake(now_s)
         self.failed = str(error)
         return []
 
     def _stop_without_brake(self, now_s: float) -> list[Action]:
         """For a vehicle without BRAKE."""
-        if self._state is not None and self._state.mode == GUIDED:
+        if self._state is not None and self._state.mode == self.guided_mode:
             return self.stop_in_guided(self._state, now_s)
-        return self.change_mode(GUIDED, now_s)
+        return self.change_mode(self.guided_mode, now_s)
 
 
 def stopping_place(state: VehicleState) -> Place:

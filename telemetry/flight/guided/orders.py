@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from planning.basics.plan_model import Firmware
 from telemetry.mavlink.actions import Message
+from telemetry.mavlink.autopilot_orders import HOLD_MODES, MISSION_MODES
 from telemetry.mavlink.modes import mode_numbers
 
 CUSTOM_MODE = 1.0
@@ -18,6 +19,7 @@ IGNORE_ALL_BUT_PLACE = 0b1101_1111_1000
 VELOCITY_IS_GIVEN = 0b1101_1100_0000
 YAW_IS_GIVEN = ~mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
 GROUND_SPEED, CLIMB_SPEED, ANY_THROTTLE = 1.0, 2.0, -1.0
+RETURNS = ("RTL", "SMART_RTL", "AUTO_RTL")
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +47,21 @@ class GuidedOrders:
     def script_modes(self) -> frozenset[str]:
         """In which the script is in charge; any other was chosen by somebody else."""
         return frozenset({"GUIDED"} if self.firmware == "ardupilot" else {"HOLD", "TAKEOFF"})
+
+    @property
+    def stop_modes(self) -> tuple[str, ...]:
+        """In order of preference. A change to GUIDED stops ArduPilot too, unless it is in GUIDED already."""
+        return HOLD_MODES[self.firmware]
+
+    @property
+    def flown_from(self) -> frozenset[str]:
+        """Modes in which no pilot flies by hand."""
+        return frozenset({MISSION_MODES[self.firmware], self.guided_mode, *self.stop_modes, *RETURNS})
+
+    @property
+    def holds_where_it_is_guided(self) -> bool:
+        """PX4 goes to places in the mode in which it also holds: that mode does not stop it there."""
+        return self.guided_mode == self.stop_modes[0]
 
     @property
     def counts_from_sea(self) -> bool:
@@ -98,6 +115,11 @@ class GuidedOrders:
             yaw=yaw_rad or 0.0,
             yaw_rate=0.0,
         )
+
+    def pause(self) -> Message:
+        """PX4 stops and holds where it comes to rest: a change of place without a place, as its navigator reads it."""
+        nan, default_speed, change_mode = math.nan, -1.0, 1.0
+        return self._long(mavlink.MAV_CMD_DO_REPOSITION, default_speed, change_mode, 0.0, nan, nan, nan, nan)
 
     def end_mode(self, end: Literal["rtl", "land"]) -> str:
         return end.upper()

@@ -8,10 +8,12 @@ from typing import Literal
 
 from mapping.geometry.frames import apart_m
 from planning.basics.mav_cmd import MavCmd
-from planning.basics.plan_model import Home, Mission, MissionItem
+from planning.basics.plan_model import Firmware, Home, Mission, MissionItem
 from planning.certificate.commands import TAKEOFFS
 from planning.errors import MissionError
+from telemetry.flight.guided.orders import RETURNS
 from telemetry.flight.guided.script_targets import guided_plan
+from telemetry.mavlink.autopilot_orders import MISSION_MODES
 from telemetry.mavlink.flight_keeper import item_of
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.onboard_lists import Item, OnboardMission
@@ -19,7 +21,6 @@ from telemetry.topics.vehicle import VehicleState
 
 LANDS_M = 20.0
 """From home; nearer than that the way home is a descent, where whatever stands around is not in the way."""
-RETURNS = ("RTL", "SMART_RTL", "AUTO_RTL")
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +37,11 @@ class RemainingMission:
 
 
 def remaining_flight(onboard: OnboardMission | None, state: VehicleState) -> RemainingMission | None:
-    """Of a mission on board that is flown in AUTO, or of a return; None: nothing that could be gone on with."""
+    """Of a mission on board that is flown, or of a return; None: nothing that could be gone on with."""
     if state.mode in RETURNS:
         return RemainingMission((), "rtl") if _is_away(state) else None
-    return remaining_mission(onboard, state) if onboard is not None and state.mode == "AUTO" else None
+    flies_it = state.mode == MISSION_MODES.get(state.autopilot)
+    return remaining_mission(onboard, state) if onboard is not None and flies_it else None
 
 
 def remaining_mission(onboard: OnboardMission, state: VehicleState) -> RemainingMission | None:
@@ -50,22 +52,23 @@ def remaining_mission(onboard: OnboardMission, state: VehicleState) -> Remaining
     command = onboard.items[number - 1].command
     if command in TAKEOFFS or command == MavCmd.NAV_LAND:
         return None
-    remaining = remaining_from(onboard, number)
+    firmware: Firmware = "px4" if state.autopilot == "px4" else "ardupilot"
+    remaining = remaining_from(onboard, number, firmware)
     return None if remaining is None or (not remaining.targets and not _is_away(state)) else remaining
 
 
-def remaining_from(onboard: OnboardMission, number: int) -> RemainingMission | None:
+def remaining_from(onboard: OnboardMission, number: int, firmware: Firmware = "ardupilot") -> RemainingMission | None:
     """From an item on, 1 is the first. None for items that no script can fly."""
     if all(item.command == MavCmd.NAV_RETURN_TO_LAUNCH for item in onboard.items[number - 1 :]):
         return RemainingMission((), "rtl")
     try:
-        plan = guided_plan(_mission(onboard))
+        plan = guided_plan(_mission(onboard, firmware))
     except MissionError:
         return None
     return RemainingMission(tuple(t for t in plan.targets if t.item >= number), plan.end)
 
 
-def _mission(onboard: OnboardMission) -> Mission:
+def _mission(onboard: OnboardMission, firmware: Firmware) -> Mission:
     """As the planner knows it. Heights above sea level are counted from the home that the vehicle told."""
     home = Home(
         onboard.home_lat_deg or 0.0,
@@ -73,7 +76,7 @@ def _mission(onboard: OnboardMission) -> Mission:
         math.nan if onboard.home_alt_amsl_m is None else onboard.home_alt_amsl_m,
         "EGM96 height",
     )
-    return Mission(home, tuple(_item(item) for item in onboard.items))
+    return Mission(home, tuple(_item(item) for item in onboard.items), firmware=firmware)
 
 
 def _item(item: Item) -> MissionItem:

@@ -176,19 +176,33 @@ class Px4Pilot(Px4Flying):
 
     def go_to(self, goal_neu: Vec3, *, heading_rad: float | None = None, hold: bool = True) -> Verdict:
         """``hold``: changes to HOLD for it."""
-        if not self.flying:
+        held = self._hold(may_change=hold)
+        if held is None:
             return "denied"
-        if not isinstance(self.mode, Px4Hold):
-            if not hold or not self.change_mode("HOLD"):
-                return "denied"
-            self._chosen = "HOLD"
-        assert isinstance(self.mode, Px4Hold)
-        self.mode.go_to(self, goal_neu)
+        held.go_to(self, goal_neu)
         if heading_rad is None:
             self.face(goal_neu, at_least_m=self.parameters["NAV_ACC_RAD"])
         else:
             self.heading_goal_rad = heading_rad
         return "accepted"
+
+    def pause(self, *, hold: bool = True) -> Verdict:
+        """Stops, and holds where it comes to rest."""
+        held = self._hold(may_change=hold)
+        if held is None:
+            return "denied"
+        held.enter(self)
+        return "accepted"
+
+    def _hold(self, *, may_change: bool) -> Px4Hold | None:
+        """The mode HOLD, into which it is brought if it may be; None: it cannot be had."""
+        if not self.flying:
+            return None
+        if not isinstance(self.mode, Px4Hold):
+            if not may_change or not self.change_mode("HOLD"):
+                return None
+            self._chosen = "HOLD"
+        return self.mode if isinstance(self.mode, Px4Hold) else None
 
     def set_current(self, seq: int) -> Verdict:
         if not 0 <= seq < len(self.mission.steps):

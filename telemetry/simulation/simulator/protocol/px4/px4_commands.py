@@ -103,7 +103,9 @@ class Px4Commands:
 
     def _reposition(self, order: ReceivedOrder) -> Verdict:
         """Heights are above mean sea level, whatever frame is named; what is not given stays."""
-        pilot = self._pilot
+        pilot, changes_mode = self._pilot, bool(whole(order.params[1]) & 1)
+        if not any(map(math.isfinite, (order.lat_deg, order.lon_deg, order.alt_m, order.params[3]))):
+            return pilot.pause(hold=changes_mode)
         n, e, u = pilot.p_neu
         if math.isfinite(order.lat_deg) and math.isfinite(order.lon_deg):
             if abs(order.lat_deg) > 90 or abs(order.lon_deg) > 180:
@@ -117,7 +119,7 @@ class Px4Commands:
         verdict = pilot.go_to(
             (n, e, u),
             heading_rad=heading if math.isfinite(heading) else None,
-            hold=bool(whole(order.params[1]) & 1),
+            hold=changes_mode,
         )
         if verdict == "accepted" and order.params[0] > 0:
             pilot.change_speed(1, order.params[0])
