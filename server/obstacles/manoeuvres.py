@@ -14,10 +14,12 @@ from server.obstacles.manoeuvre_situation import Prepared
 from server.obstacles.manoeuvre_task import prepare
 from server.obstacles.surroundings import Surroundings
 from server.scene.layers.region_layers import Route
+from server.schemas import ManoeuvreDoc
 from server.work.jobs import Lane
+from telemetry.bus.link_client import LinkClient
 from telemetry.errors import NotAllowedError
 from telemetry.topics.obstacles import ObstacleAlert
-from telemetry.topics.requests import FlyManoeuvre, Operator
+from telemetry.topics.requests import FlyManoeuvre, MayFlyManoeuvre, Operator
 
 log = logging.getLogger("hedgehop.obstacles")
 
@@ -33,8 +35,8 @@ TURNED_RAD = math.radians(60.0)
 class Manoeuvres:
     """One obstacle and one moving object at a time, the newest of each: ``run`` prepares, the desk flies."""
 
-    def __init__(self, around: Surroundings, lane: Lane) -> None:
-        self._around, self._watch, self._lane = around, around.watch, lane
+    def __init__(self, around: Surroundings, lane: Lane, link: LinkClient) -> None:
+        self._around, self._watch, self._lane, self._link = around, around.watch, lane, link
         self._alerts: dict[str, ObstacleAlert] = {}
         self._wake = asyncio.Event()
         self.prepared: tuple[Prepared, ...] = ()
@@ -135,7 +137,7 @@ class Manoeuvres:
                 self._show(())  # those on show begin where the vehicle is no more
                 return
             self._busy("" if self.prepared else "Looking for a way past the obstacle")
-            prepared = await self._lane.call(prepare, situation)
+            prepared = tuple([await self._allowed(each) for each in await self._lane.call(prepare, situation)])
         except Exception as error:
             log.warning("No manoeuvre: %s", reported(error, log, "Preparing a manoeuvre").what)
             prepared = ()
@@ -143,6 +145,18 @@ class Manoeuvres:
         # Another alert, or none, while the worker was at it: what it found is void.
         served = self._standing is standing and self._moving is moving
         self._show(prepared if served else self.prepared)
+
+    async def _allowed(self, found: Prepared) -> Prepared:
+        """What the link would refuse is no offer, and its words are the reason."""
+        if not found.doc.possible:
+            return found
+        kind, offset_m = found.doc.kind, found.height_offset_m
+        why = await self._link.call(MayFlyManoeuvre(kind, found.targets, found.rejoin_item, offset_m))
+        if not why:
+            return found
+        return Prepared(
+            ManoeuvreDoc(id=found.doc.id, kind=kind, for_alert=found.doc.for_alert, possible=False, text=why)
+        )
 
     def _busy(self, what: str) -> None:
         self._watch.busy = what

@@ -71,7 +71,7 @@ class Obstacles:
         self.traffic = TrafficWatch("live", pages)
         self.traffic_desk = TrafficDesk(folder, bus, self.traffic)
         around = Surroundings(library, aboard, live, self.watches["live"], self.tracks["live"])
-        self._manoeuvres = Manoeuvres(around, lane)
+        self._manoeuvres = Manoeuvres(around, lane, link)
         self._coming_down = ComingDown(around, link, lane, lease)
         self._ground = KnownGround(library, bus)
         self.sensor_nodes = SensorNodes(bus, nodes)

@@ -24,6 +24,7 @@ from telemetry.topics.requests import (
     ListParameters,
     ListVehicleLogs,
     Looks,
+    MayFlyManoeuvre,
     Operator,
     ReadMetadata,
     ReadParameters,
@@ -63,6 +64,7 @@ _ANSWERS: dict[type, Any] = {
     ListVehicleLogs: tuple[VehicleLog, ...],
     ReadVehicleLog: bytes,
     HighestToken: int,
+    MayFlyManoeuvre: str,
 }
 IssueAbove = Callable[[Operator, int], Operator | None]
 """The same operator with a token above this one, which no server has issued; None: it has, to somebody else."""
@@ -91,6 +93,8 @@ class LinkClient:
     async def call(self, request: ListVehicleLogs) -> tuple[VehicleLog, ...]: ...
     @overload
     async def call(self, request: ReadVehicleLog) -> bytes: ...
+    @overload
+    async def call(self, request: MayFlyManoeuvre) -> str: ...
     @overload
     async def call(self, request: LinkRequest) -> Any: ...
     async def call(self, request: LinkRequest) -> Any:

@@ -102,6 +102,7 @@ class Answering:
             requests.SetSpeed: self._set_speed,
             requests.SetAvoidance: self._set_avoidance,
             requests.FlyManoeuvre: self._fly_manoeuvre,
+            requests.MayFlyManoeuvre: self._may_fly_manoeuvre,
             requests.FlyRest: self._fly_rest,
         }
 
@@ -276,10 +277,17 @@ class Answering:
 
     async def _fly_manoeuvre(self, request: requests.FlyManoeuvre) -> None:
         pilot = self._link.need_session().pilot
-        pilot.avoidance.check_autopilot()
+        pilot.check_manoeuvre(request)
         what = "past a moving object" if request.kind == "sidestep" else f"{request.kind} an obstacle"
         await self._record(request, f"fly {what}, {len(request.targets)} places")
         await pilot.fly_manoeuvre(request)
+
+    async def _may_fly_manoeuvre(self, request: requests.MayFlyManoeuvre) -> str:
+        try:
+            self._link.need_session().pilot.check_manoeuvre(request)
+        except NotAllowedError as error:
+            return f"{error.what} {error.advice}".strip()
+        return ""
 
     async def _fly_rest(self, request: requests.FlyRest) -> None:
         pilot = self._link.need_session().pilot

@@ -16,7 +16,7 @@ from telemetry.mavlink.modes import commanded_mode
 from telemetry.topics.messages import FlightStatus
 from telemetry.topics.obstacles import AvoidanceStatus, AvoidBy, PerceptionSettings, PerceptionStatus
 from telemetry.topics.onboard_lists import OnboardMission
-from telemetry.topics.requests import FlyManoeuvre, FlyRest
+from telemetry.topics.requests import FlyManoeuvre, FlyRest, MayFlyManoeuvre
 from telemetry.topics.tracks import TracksStatus
 from telemetry.topics.vehicle import VehicleState
 
@@ -99,6 +99,11 @@ class Avoidance:
     def disable(self) -> None:
         self._perform(self._avoiding.disable(time.monotonic()))
 
+    def check_may_fly(self, request: FlyManoeuvre | MayFlyManoeuvre) -> None:
+        """Raises NotAllowedError for a prepared way that may not be flown now."""
+        self.check_autopilot()
+        self._avoiding.check_may_fly(request)
+
     def fly(self, request: FlyManoeuvre, remaining: RemainingMission) -> None:
         self._perform(self._avoiding.fly(request, remaining, time.monotonic()))
 
@@ -150,7 +155,7 @@ class Avoidance:
 
 
 def remaining_after(
-    request: FlyManoeuvre,
+    request: FlyManoeuvre | MayFlyManoeuvre,
     remaining: RemainingMission | None,
     onboard: OnboardMission | None,
     firmware: Firmware,

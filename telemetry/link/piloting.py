@@ -31,7 +31,7 @@ from telemetry.mavlink.autopilot_orders import HOLD_MODES, MISSION_MODES
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of
 from telemetry.topics.onboard_lists import OnboardMission
-from telemetry.topics.requests import FlyManoeuvre, FlyWay, SetSpeed, StartAuto, StartGuided, TakeUp
+from telemetry.topics.requests import FlyManoeuvre, FlyWay, MayFlyManoeuvre, SetSpeed, StartAuto, StartGuided, TakeUp
 from telemetry.topics.vehicle import VehicleState
 
 RESTART_PARAMETER = "MIS_RESTART"
@@ -227,9 +227,15 @@ class Pilot:
         self._end_current()
         await self.vehicle.obey(self.vehicle.orders.stop_motors())
 
+    def check_manoeuvre(self, request: FlyManoeuvre | MayFlyManoeuvre) -> RemainingMission:
+        """What would be flown after it. Raises NotAllowedError where it may not be flown now: what is refused here is
+        not offered either."""
+        self.avoidance.check_may_fly(request)
+        return self._remaining_after(request)
+
     async def fly_manoeuvre(self, request: FlyManoeuvre) -> None:
-        """Raises NotAllowedError when nothing is flown that could be gone on with."""
-        self.avoidance.fly(request, self._remaining_after(request))
+        """Raises NotAllowedError as ``check_manoeuvre`` does."""
+        self.avoidance.fly(request, self.check_manoeuvre(request))
 
     async def pause(self) -> None:
         if self.avoidance.is_engaged:
@@ -311,7 +317,7 @@ class Pilot:
             return self.join.remaining
         return remaining_flight(self.vehicle.onboard.mission, state)
 
-    def _remaining_after(self, request: FlyManoeuvre) -> RemainingMission:
+    def _remaining_after(self, request: FlyManoeuvre | MayFlyManoeuvre) -> RemainingMission:
         """What is flown after the way past an obstacle. Raises NotAllowedError where that cannot be flown."""
         remaining = self.avoidance.remaining
         if remaining is None and self.script_flies and self.script is not None:

@@ -324,6 +324,19 @@ class FlyManoeuvre(OperatorRequest):
 
 
 @dataclass(frozen=True, slots=True)
+class MayFlyManoeuvre:
+    """Whether a FlyManoeuvre like this would be refused now, by the same rule; nothing moves.
+
+    -> str: why it would be; empty if it would not
+    """
+
+    kind: Literal["over", "around", "sidestep"]
+    targets: tuple[GuidedTarget, ...]
+    rejoin_item: int | None
+    height_offset_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class FlyRest(OperatorRequest):
     """The rest of a flight that goes on higher, planned again past what was seen and certified, is flown instead.
 
@@ -333,7 +346,7 @@ class FlyRest(OperatorRequest):
     targets: tuple[GuidedTarget, ...]
 
 
-Looks = ReadParameters | ListParameters | ReadMetadata | HighestToken
+Looks = ReadParameters | ListParameters | ReadMetadata | HighestToken | MayFlyManoeuvre
 """Requests to the link that change nothing: anybody may ask them."""
 LinkRequest = (
     Connect
@@ -368,6 +381,7 @@ LinkRequest = (
     | Land
     | SetAvoidance
     | FlyManoeuvre
+    | MayFlyManoeuvre
     | FlyRest
 )
 

@@ -18,7 +18,7 @@ from server.schemas import ManoeuvreDoc
 from telemetry.errors import NotAllowedError
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.obstacles import AvoidanceStatus
-from telemetry.topics.requests import Operator
+from telemetry.topics.requests import MayFlyManoeuvre, Operator
 from telemetry.topics.vehicle import VehicleState
 from tests.server.fakes import Told
 from tests.server.obstacle_messages import alert, approach
@@ -43,7 +43,15 @@ class Desk:
         self.answers = list(answers)
         self.asked: list[Any] = []
         me: Any = self
-        self.manoeuvres = Manoeuvres(me, me)
+        self.refusals: dict[str, str] = {}
+        """Of the link, by the kind of manoeuvre."""
+        self.questions: list[MayFlyManoeuvre] = []
+        link: Any = SimpleNamespace(call=self._may_fly)
+        self.manoeuvres = Manoeuvres(me, me, link)
+
+    async def _may_fly(self, request: MayFlyManoeuvre) -> str:
+        self.questions.append(request)
+        return self.refusals.get(request.kind, "")
 
     def request(self, manoeuvre_id: str) -> Any:
         return asyncio.run(self.manoeuvres.request(ANNA, manoeuvre_id))
@@ -98,6 +106,24 @@ def test_they_come_with_the_alert_and_go_with_it() -> None:
     desk.manoeuvres.on_alert(alert(phase="ends"))
     assert desk.watch.state.manoeuvres == []
     with pytest.raises(NotFoundError, match="out of date"):
+        desk.request("over-radar-1")
+
+
+def test_what_the_link_would_refuse_is_not_offered_and_its_words_are_the_reason() -> None:
+    desk = Desk((prepared("over"), prepared("around"), prepared("sidestep", possible=False)))
+    desk.refusals["over"] = "Beyond the fence. Fly another way, or return."
+    desk.manoeuvres.on_alert(alert())
+    asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
+    assert [(doc.kind, doc.possible, doc.text) for doc in desk.watch.state.manoeuvres[:2]] == [
+        ("over", False, "Beyond the fence. Fly another way, or return."),
+        ("around", True, "Climb."),
+    ]
+    assert [route.words for route in desk.manoeuvres.routes if "Over" in route.words] == []
+    assert [(asked.kind, asked.rejoin_item, asked.height_offset_m) for asked in desk.questions] == [
+        ("over", 4, 6.0),
+        ("around", 4, 6.0),
+    ]
+    with pytest.raises(NotAllowedError, match="Beyond the fence"):
         desk.request("over-radar-1")
 
 

@@ -13,7 +13,7 @@ from telemetry.errors import NotAllowedError
 from telemetry.simulation.simulator.run import Simulator
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.obstacles import PerceptionSettings, PerceptionStatus
-from telemetry.topics.requests import FlyManoeuvre, Pause, Resume, StartAuto
+from telemetry.topics.requests import FlyManoeuvre, MayFlyManoeuvre, Pause, Resume, StartAuto
 from tests.telemetry.avoiding_bench import Wall
 from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, Console, again_and_again, until
@@ -129,13 +129,19 @@ def test_a_prepared_way_around_is_flown_paused_resumed_and_the_mission_goes_on()
     run(whole)
 
 
-def test_a_way_that_is_too_high_is_refused_before_anything_moves() -> None:
+def test_what_is_refused_is_told_before_it_is_ordered_in_the_same_words() -> None:
     async def whole() -> None:
         async with before_a_wall(None) as (bench, watched):
             await in_its_mission(bench, watched)
             aside = (GuidedTarget(1, LAT_DEG + STEP_DEG, LON_DEG, 14.0, 3.0),)
-            with pytest.raises(NotAllowedError, match="are the most"):
-                await bench.handle(FlyManoeuvre(ME, "over", aside, None, 90.0))
+            await until(lambda: bench.state.landed == "in_air")
+            for places, item, offset_m in ((aside, None, 90.0), ((), None, 0.0), (aside, 99, 0.0)):
+                why = await bench.handle(MayFlyManoeuvre("over", places, item, offset_m))
+                with pytest.raises(NotAllowedError) as refused:
+                    await bench.handle(FlyManoeuvre(ME, "over", places, item, offset_m))
+                assert why == str(refused.value)
+            assert await bench.handle(MayFlyManoeuvre("over", aside, 4)) == ""
             assert avoidance(bench).state == "off"
+            assert not [words for words in bench.commands if words.startswith("fly over")]
 
     run(whole)

@@ -25,7 +25,7 @@ from telemetry.mavlink.actions import Action, Message
 from telemetry.mavlink.conversation import GROUND_STATION
 from telemetry.topics.messages import FlightStatus, GuidedTarget
 from telemetry.topics.obstacles import AvoidanceStatus, AvoidBy, PerceptionSettings, PerceptionStatus
-from telemetry.topics.requests import FlyManoeuvre, FlyRest
+from telemetry.topics.requests import FlyManoeuvre, FlyRest, MayFlyManoeuvre
 from telemetry.topics.tracks import TracksStatus
 from telemetry.topics.vehicle import VehicleState
 
@@ -141,8 +141,8 @@ class Avoiding:
         wanted = self.enabled and self.by == "sidestep"
         return self.detour.stop_aside(now_s) if self.detour.phase == "aside" and not wanted else []
 
-    def fly(self, request: FlyManoeuvre, remaining: RemainingMission, now_s: float) -> list[Action]:
-        """A prepared way, then ``remaining`` higher by what the request says. Raises NotAllowedError."""
+    def check_may_fly(self, request: FlyManoeuvre | MayFlyManoeuvre) -> None:
+        """Raises NotAllowedError for a prepared way that may not be flown now."""
         state = self._state
         self._check_way(request)
         if state is None or not _is_flying(state):
@@ -153,6 +153,10 @@ class Avoiding:
             raise NotAllowedError(self.released, advice="The pilot flies the vehicle.")
         if state.mode not in self._helm.orders.flown_from:
             raise NotAllowedError(f"The vehicle is flown in {state.mode}, by hand.", advice="Pause it first.")
+
+    def fly(self, request: FlyManoeuvre, remaining: RemainingMission, now_s: float) -> list[Action]:
+        """A prepared way, then ``remaining`` higher by what the request says. Raises NotAllowedError."""
+        self.check_may_fly(request)
         if not self.enabled and not self.is_engaged:
             self._watch.begin()  # what anybody did before this order releases nothing
         self._on_engage()
@@ -175,7 +179,7 @@ class Avoiding:
             raise NotAllowedError(f"The lower line is not flown. {why}", advice="It stays higher.")
         return detour.come_down(targets, state, now_s)
 
-    def _check_way(self, request: FlyManoeuvre) -> None:
+    def _check_way(self, request: FlyManoeuvre | MayFlyManoeuvre) -> None:
         _check_targets(request.targets)
         if not math.isfinite(request.height_offset_m):
             raise NotAllowedError("The way has a place that is no number.", advice="Prepare it again.")

@@ -58,7 +58,9 @@ def remaining_mission(onboard: OnboardMission, state: VehicleState) -> Remaining
 
 
 def remaining_from(onboard: OnboardMission, number: int, firmware: Firmware = "ardupilot") -> RemainingMission | None:
-    """From an item on, 1 is the first. None for items that no script can fly."""
+    """From an item on, 1 is the first. None for items that no script can fly, and for one that is not on board."""
+    if not 1 <= number <= len(onboard.items):
+        return None
     if all(item.command == MavCmd.NAV_RETURN_TO_LAUNCH for item in onboard.items[number - 1 :]):
         return RemainingMission((), "rtl")
     try:
