@@ -27,6 +27,7 @@ from telemetry.simulation.simulator.autopilot.px4.px4_modes import (
     Sticks,
     TakeOff,
 )
+from telemetry.simulation.simulator.autopilot.px4.smoothing import Turn
 from telemetry.simulation.simulator.autopilot.px4.unrest import MovingHome, Unrest
 from telemetry.simulation.simulator.neu_frame import NeuFrame, Vec3
 
@@ -60,6 +61,7 @@ class Px4Pilot(Px4Flying):
         self.mode: Px4Mode = Px4Hold()
         self.mode.enter(self)
         self.control = Px4PositionControl(parameters)
+        self._turn = Turn()
         self._unrest = Unrest(np.random.default_rng(shaken))
         self._moving_home = MovingHome(np.random.default_rng(moved), is_on=home_moves)
         self._speedup = speedup
@@ -230,14 +232,18 @@ class Px4Pilot(Px4Flying):
         self.p_neu, self.v_neu, self.above_ground_m = sensed.p_neu, sensed.v_neu, sensed.above_ground_m
         self._boot()
         if not self.armed:
-            self.heading_goal_rad = sensed.heading_rad
+            self._face_as_it_stands(sensed)
             return None
         self._watch_gcs()
         if not self.flying:
-            self.heading_goal_rad = sensed.heading_rad
+            self._face_as_it_stands(sensed)
             self._wait_on_ground()
             return None
         return self._fly(sensed, dt_s)
+
+    def _face_as_it_stands(self, sensed: Sensed) -> None:
+        self.heading_goal_rad = sensed.heading_rad
+        self._turn.reset(sensed.heading_rad)
 
     def _fly(self, sensed: Sensed, dt_s: float) -> Demand | None:
         ramp_s = self.now_s - self._ramp_s
@@ -259,7 +265,10 @@ class Px4Pilot(Px4Flying):
             self.target, self.p_neu, self.v_neu, dt_s, climb_m_s=climb_m_s, tilt_rad=math.radians(tilt)
         )
         shaken = self._unrest.step(dt_s)
-        return Demand((accel[0] + shaken[0], accel[1] + shaken[1], accel[2] + shaken[2]), self.heading_goal_rad)
+        turning = (math.radians(self.parameters[f"MPC_YAWRAUTO_{name}"]) for name in ("ACC", "MAX"))
+        accel_rad_s2, fastest_rad_s = turning
+        self._turn.step(self.heading_goal_rad, dt_s, accel_rad_s2=accel_rad_s2, fastest_rad_s=fastest_rad_s)
+        return Demand((accel[0] + shaken[0], accel[1] + shaken[1], accel[2] + shaken[2]), self._turn.heading_rad)
 
     def _fastest_climb_m_s(self, ramp_s: float) -> float:
         p = self.parameters

@@ -82,6 +82,23 @@ class Axis:
         return max(0.0, first_s)
 
 
+class Turn:
+    """The heading that is asked for on the way to another one: it turns faster and slower at a limited rate."""
+
+    def __init__(self) -> None:
+        self.heading_rad = self._rate_rad_s = 0.0
+
+    def reset(self, heading_rad: float) -> None:
+        self.heading_rad, self._rate_rad_s = heading_rad, 0.0
+
+    def step(self, goal_rad: float, dt_s: float, *, accel_rad_s2: float, fastest_rad_s: float) -> None:
+        left_rad = math.remainder(goal_rad - self.heading_rad, math.tau)
+        wish_rad_s = math.copysign(min(fastest_rad_s, math.sqrt(2 * accel_rad_s2 * abs(left_rad))), left_rad)
+        change_rad_s = accel_rad_s2 * dt_s
+        self._rate_rad_s += max(-change_rad_s, min(change_rad_s, wish_rad_s - self._rate_rad_s))
+        self.heading_rad = (self.heading_rad + self._rate_rad_s * dt_s) % math.tau
+
+
 def end_together(axes: Sequence[Axis]) -> None:
     longest = max(axes, key=lambda axis: axis.duration_s)
     for axis in axes:
