@@ -66,7 +66,7 @@ def test_places_after_the_climb_are_the_missions_raised_and_counted_from_the_sea
     assert [round((m.x / 1e7 - HOME.lat_deg) * NORTH_PER_DEG) for m in last] == [45, 60]
     offset_m = last[0].z - HOME.alt_amsl_m - 8.0
     assert all(m.z == pytest.approx(HOME.alt_amsl_m + 8.0 + offset_m, abs=0.05) for m in last)
-    assert all((m.frame, m.param2) == (0, 1) for m in last)
+    assert all((m.frame, m.param2) == (0, 0) for m in last)  # no pilot's mode is undone
     assert 7.0 < offset_m < 14.0
 
 

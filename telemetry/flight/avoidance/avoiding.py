@@ -226,7 +226,8 @@ class Avoiding:
         self.detour.trail.on_state(state)
         if self.released and state.mode != self._helm.guided_mode:
             self._helm.let_go()
-        if _is_flying(state):
+        lands = self.is_engaged and state.armed and state.landed == "landing"  # it may show before the mode does
+        if _is_flying(state) or lands:
             self._watch.on_state(state, now_s)
         else:
             self._on_ground(state)

@@ -176,7 +176,8 @@ class Helm:
         self._handover.sent(self._state, now_s)
         speed = [] if self._is_placed or self._speed is None else self._order_speed(now_s)
         self._is_placed = True
-        return [Send(self.orders.go_to(self._handover.place)), *speed]
+        # A pilot's mode that has not shown yet is not undone by it.
+        return [Send(self.orders.go_to(self._handover.place, changes_mode=False)), *speed]
 
     def _on_failed(self, error: TelemetryError, now_s: float) -> list[Action]:
         mode, self._mode, self._speed, self._stops = self._mode, "", None, False

@@ -86,9 +86,10 @@ class GuidedOrders:
         """``kind``: SPEED_TYPE."""
         return self._long(mavlink.MAV_CMD_DO_CHANGE_SPEED, kind, speed_m_s, ANY_THROTTLE)
 
-    def go_to(self, place: Place) -> Message:
+    def go_to(self, place: Place, *, changes_mode: bool = True) -> Message:
+        """``changes_mode``: of PX4 in another mode, which else takes no notice."""
         if self.firmware == "px4":
-            return self._reposition(place)
+            return self._reposition(place, float(changes_mode))
         return self._position_target(place, IGNORE_ALL_BUT_PLACE, (0.0, 0.0, 0.0))
 
     def follow(self, place: Place, v_neu_m_s: tuple[float, float, float]) -> Message:
@@ -117,15 +118,15 @@ class GuidedOrders:
         )
 
     def pause(self) -> Message:
-        """PX4 stops and holds where it comes to rest: a change of place without a place, as its navigator reads it."""
-        nan, default_speed, change_mode = math.nan, -1.0, 1.0
+        """PX4 in HOLD stops and stays: a change of place without a place, as its navigator reads it."""
+        nan, default_speed, change_mode = math.nan, -1.0, 0.0
         return self._long(mavlink.MAV_CMD_DO_REPOSITION, default_speed, change_mode, 0.0, nan, nan, nan, nan)
 
     def end_mode(self, end: Literal["rtl", "land"]) -> str:
         return end.upper()
 
-    def _reposition(self, place: Place) -> Message:
-        default_speed, change_mode = -1.0, 1.0
+    def _reposition(self, place: Place, change_mode: float) -> Message:
+        default_speed = -1.0
         yaw = math.nan if place.heading_rad is None else place.heading_rad
         lat_e7, lon_e7 = round(place.lat_deg * 1e7), round(place.lon_deg * 1e7)
         alt_amsl_m = place.home_alt_amsl_m + place.alt_rel_home_m
