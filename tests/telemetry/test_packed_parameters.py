@@ -20,7 +20,7 @@ from telemetry.mavlink.logs.ftp.questions import Numbers
 from telemetry.mavlink.logs.ftp.whole import FtpReadWhole
 from telemetry.mavlink.parameters.packed import MOST_BYTES, PATH, read_packed
 from telemetry.simulation.simulator.autopilot.autopilot_parameters import SPECS, Kind, Parameters, Spec
-from telemetry.simulation.simulator.own_log import OwnLogs
+from telemetry.simulation.simulator.own_logs.keeping import OwnLogs
 from telemetry.simulation.simulator.protocol.file_protocol import FileProtocol
 from telemetry.simulation.simulator.protocol.made_files import MadeFile, ardupilot_file, packed
 from telemetry.topics.parameters import Parameter
@@ -113,9 +113,9 @@ class MakesFiles(FileVehicle):
 
     def __init__(self, content: bytes, said: int) -> None:
         self.files = FileProtocol(
-            cast(OwnLogs, SimpleNamespace(logs=[])),
-            FOLDER,
-            lambda path: MadeFile(content, said) if path == "/@f" else None,
+            cast(OwnLogs, SimpleNamespace(files={}, writer=SimpleNamespace(folder=FOLDER))),
+            most_sessions=4,
+            made=lambda path: MadeFile(content, said) if path == "/@f" else None,
         )
 
 
