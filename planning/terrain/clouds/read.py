@@ -22,7 +22,7 @@ from planning.terrain.rasters.memory_at_hand import watched
 from planning.terrain.rasters.reading import Progress
 
 LIMITS = RasterLimits(max_px=100_000_000, max_memory_bytes=3 * 2**30, header_s=60.0)
-_DECODER = "clouds"
+_DECODER = __name__.rpartition(".")[0]
 _COARSE = 0.1
 """Steps of coordinates that are told, of a cell."""
 _SMALLER = "Crop it to the area of the flight, or thin it out."

@@ -1,4 +1,4 @@
-"""The child process that decodes one raster or cloud: a job comes in on stdin, messages leave on stdout, as JSON lines.
+"""The child process that decodes one raster, cloud or bag: a job comes on stdin, messages leave on stdout, JSON lines.
 
 Started by ``planning.terrain.rasters.sandbox`` with GDAL's settings already in the environment. It imports
 little, so that it starts fast and its memory limit means something.
@@ -22,7 +22,14 @@ from planning.terrain.rasters.confinement import confine, confine_files
 
 Json = dict[str, Any]
 
-_TERRAIN = (__package__ or "").rpartition(".")[0]
+_OURS = __package__ or ""
+_KINDS = {"read_cloud": "cloud", "list_bag": "bag", "read_bag": "bag"}
+"""Of a job's file; all others are rasters."""
+_SMALLER = {
+    "raster": "Rewrite it as a tiled GeoTIFF.",
+    "cloud": "Thin the cloud out, or crop it.",
+    "bag": "Cut a shorter piece out of it, or one with fewer topics.",
+}
 
 
 def main() -> None:
@@ -34,7 +41,7 @@ def main() -> None:
     _confine(job)
     try:
         # After the limits: GDAL registers its drivers on import.
-        decoder = importlib.import_module(f"{_TERRAIN}.{job.get('decoder', 'rasters')}.decode")
+        decoder = importlib.import_module(f"{job.get('decoder', _OURS)}.decode")
 
         confine_files(readable=_readable(job), writable=[Path(path) for path in job["writable"]])
         decoder.JOBS[job["job"]](job, send, partial(_ask, send))
@@ -86,12 +93,12 @@ def _readable(job: Json) -> list[Path]:
 
 
 def _explain(error: Exception, job: str) -> Json:
-    cause = str(error.__cause__ or error) or type(error).__name__
+    cause, kind = str(error.__cause__ or error) or type(error).__name__, _KINDS.get(job, "raster")
     if isinstance(error, MemoryError) or "memory" in cause.lower() or "allocat" in cause.lower():
         return {
             "kind": "too_large",
             "what": f"Decoding needs more memory than allowed ({cause}).",
-            "advice": "Thin the cloud out, or crop it." if job == "read_cloud" else "Rewrite it as a tiled GeoTIFF.",
+            "advice": _SMALLER[kind],
         }
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         return {
@@ -105,7 +112,6 @@ def _explain(error: Exception, job: str) -> Json:
             "what": f"It cannot be written ({cause}).",
             "advice": "Check the folder and its rights.",
         }
-    kind = "cloud" if job == "read_cloud" else "raster"
     return {
         "kind": "format",
         "what": f"It cannot be decoded; it is corrupt, cut short or no {kind} ({cause}).",

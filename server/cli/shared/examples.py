@@ -131,6 +131,11 @@ REVIEW = _examples(
 MAP = _examples(
     ("What the radar saw, for a point cloud viewer", "hedgehop map flight.mcap --sensor radar --out radar.ply"),
     ("The highest obstacles as a raster", "hedgehop map flight.mcap --sensor radar --out radar.tif --json"),
+    ("Of a robot's bag", "hedgehop map run.bag --sensor radar --points /radar/points --pose /odom --out radar.ply"),
+)
+BAG = _examples(
+    ("What a ROS 1 bag holds", "hedgehop bag run.bag"),
+    ("A ROS 2 bag's folder, for a script", "hedgehop bag rosbag2_2026_05_01-10_00_00 --json"),
 )
 AGENT = _examples(
     ("A TI radar at its two serial ports", "hedgehop agent https://gcs.example --token-file sensor-token.txt "

@@ -1,4 +1,4 @@
-"""``hedgehop map``: a recording's map of obstacles, made once more from what its sensors saw."""
+"""``hedgehop map``: the map of obstacles of a recording or a bag of ROS, made from what its sensors saw."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typer import Argument, Option
 
 from mapping.errors import ParameterError
 from planning.errors import DescribedError
+from server.cli.maps.bag_options import BagOptions, as_recording
 from server.cli.shared import options as o
 from server.cli.shared.command import command
 from server.cli.shared.output import answer, end_progress, progress, say_notes
@@ -18,6 +19,8 @@ from telemetry.perception.rebuilding.export import KINDS as FORMATS
 from telemetry.perception.rebuilding.export import ExportError, Kind, exported
 from telemetry.perception.rebuilding.rebuild import OtherMap, Rebuilt, rebuild
 from telemetry.perception.sensor_kinds import KINDS, check_memory
+
+NO_BAG = BagOptions()
 
 
 class MapFileError(DescribedError):
@@ -28,7 +31,7 @@ class MapFileError(DescribedError):
 
 @command
 def build_map(
-    recording: Annotated[Path, Argument(metavar="RECORDING", help="A recording of Hedgehop (.mcap).")],
+    recording: Annotated[Path, Argument(metavar="RECORDING", help="A recording of Hedgehop (.mcap), or a bag of ROS.")],
     sensor: Annotated[Literal["radar", "vision", "ranges"], Option(help="Whose map.")],
     out: Annotated[Path, Option(metavar="FILE", help="Ends with .ply, .bt, .tif or .geojson.")],
     resolution_m: Annotated[float | None, Option(metavar="M", help="Edge of a voxel; default: as in flight.")] = None,
@@ -55,29 +58,27 @@ def build_map(
     whole_flight: Annotated[
         bool, Option("--whole-flight", help="Of the camera: all that it saw on its way, not its last frame alone.")
     ] = False,
+    bag: BagOptions = NO_BAG,
     as_json: o.AsJson = False,
 ) -> None:
-    """Build a recording's map of obstacles again: exactly as it was in flight, or otherwise."""
+    """Build a recording's map of obstacles again, exactly as it was in flight or otherwise; or that of a bag of ROS."""
     kind: Kind | None = next((name for name in FORMATS if out.suffix.lower() == f".{name}"), None)
     if kind is None:
         what = f"{out.suffix or 'No ending'} is no format of maps."
         raise MapFileError(what, where=out.name, advice="Choose .ply, .bt, .tif or .geojson.")
     began_s = time.monotonic()
-    built = rebuild(
-        recording,
-        KINDS[sensor],
-        other=OtherMap(
-            resolution_m,
-            _limit_bytes(memory_mb),
-            _variant(radar_variant),
-            azimuth_deg,
-            low_deg,
-            high_deg,
-            cloud_voxel_m,
-            whole_flight,
-        ),
-        progress=lambda share: progress("Building the map", share),
+    other = OtherMap(
+        resolution_m,
+        _limit_bytes(memory_mb),
+        _variant(radar_variant),
+        azimuth_deg,
+        low_deg,
+        high_deg,
+        cloud_voxel_m,
+        whole_flight,
     )
+    with as_recording(recording, sensor, bag, kind=kind) as flight:
+        built = rebuild(flight, KINDS[sensor], other=other, progress=lambda share: progress("Building the map", share))
     end_progress()
     say_notes(*built.notes)
     _check_not_empty(built, recording)

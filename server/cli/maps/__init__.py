@@ -1,0 +1,1 @@
+"""Maps made from recordings and from bags of ROS."""
