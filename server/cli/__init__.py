@@ -74,6 +74,7 @@ class _Commands(_Lazy):
         "cloud": (".cloud_command.cloud", examples.CLOUD),
         "map": (".maps.map_command.build_map", examples.MAP),
         "bag": (".maps.bag_command.bag", examples.BAG),
+        "export": (".maps.export_command.export", examples.EXPORT),
         "traversability": (".traversability_command.traversability", examples.TRAVERSABILITY),
         "agent": (".agent.command.agent", examples.AGENT),
         "audit": (".audit_command.audit", examples.AUDIT),

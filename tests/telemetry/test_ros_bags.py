@@ -14,9 +14,9 @@ from telemetry.errors import RecordingError
 from telemetry.perception.rebuilding.rebuild import OtherMap, Rebuilt, rebuild
 from telemetry.perception.sensor_kinds import KINDS as SENSORS
 from telemetry.recording.mcap_files.reader import open_recording
-from telemetry.recording.ros.bag import bag_kind, list_bag, read_bag
+from telemetry.recording.ros.bag import bag_kind, contents_of, list_bag, read_bag
 from telemetry.recording.ros.bag_flight import BagAsked, BagFlight, write_bag_flight
-from telemetry.recording.ros.bag_types import CLOUD
+from telemetry.recording.ros.bag_types import CLOUD, TABLES
 from telemetry.recording.ros.point_messages import MalformedMessageError, points_of
 from telemetry.topics.messages import Topic
 from telemetry.topics.obstacles import Sensor
@@ -305,6 +305,18 @@ def test_what_is_no_bag_is_refused(tmp_path: Path, content: bytes) -> None:
     assert caught.value.advice
     with pytest.raises(RecordingError, match="no such bag"):
         list_bag(tmp_path / "none.bag")
+
+
+def test_what_the_decoding_process_says_is_not_believed_unseen(tmp_path: Path) -> None:
+    rows = {name: np.zeros(2, kind) for name, kind in TABLES.items()}
+    for name, column, value in (("frames", "frame", 3), ("frames", "count", 3), ("transforms", "child", -1)):
+        for each, table in rows.items():
+            changed = table.copy()
+            if each == name:
+                changed[column][1] = value
+            changed.tofile(tmp_path / each)
+        with pytest.raises(RecordingError, match="does not fit together"):
+            contents_of(tmp_path, {"names": ["a"], "counts": {}, "broken": ""})
 
 
 def test_own_recordings_are_no_bags(tmp_path: Path) -> None:

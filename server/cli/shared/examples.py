@@ -136,6 +136,7 @@ MAP = _examples(
 BAG = _examples(
     ("What a ROS 1 bag holds", "hedgehop bag run.bag"),
     ("A ROS 2 bag's folder, for a script", "hedgehop bag rosbag2_2026_05_01-10_00_00 --json"),
+    ("As a recording, for Review", "hedgehop bag run.bag --points /radar/points --home-alt-amsl-m 432 --out run.mcap"),
 )
 AGENT = _examples(
     ("A TI radar at its two serial ports", "hedgehop agent https://gcs.example --token-file sensor-token.txt "
@@ -160,6 +161,7 @@ CLOUD = _examples(
     ("A robot's cloud, in metres around a place", "hedgehop cloud scan.pcd --out dsm.tif --cell-m 0.25 "
      "--crs '+proj=tmerc +lat_0=37.7290 +lon_0=14.9926 +units=m'"),
 )  # fmt: skip
+EXPORT = _examples(("A flight for ROS 2's tools", "hedgehop export flight.mcap --ros2 flight-ros2.mcap"))
 TRAVERSABILITY = _examples(
     ("Where a rover can drive, as rasters", "hedgehop traversability dsm.tif --out ground"),
     ("Foliage cleared by a radar, landing sites near a point", "hedgehop traversability dsm.tif --uwb drive.npz "

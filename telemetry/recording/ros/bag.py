@@ -134,9 +134,14 @@ def read_bag(path: Path, table: BagTable, *, points: str, pose: str, progress: P
 
 
 def contents_of(directory: Path, found: dict[str, Any]) -> BagContents:
-    """Of the files that the decoding process has left there, and of what it said."""
+    """Of the files that the decoding process has left there, and of what it said; neither is believed unseen.
+
+    Raises RecordingError where they do not fit together.
+    """
     rows = {name: np.fromfile(directory / name, dtype) for name, dtype in TABLES.items()}
     names, counts = tuple(map(str, found["names"])), found["counts"]
+    if not _fits(rows, len(names)):
+        raise RecordingError("What was decoded of it does not fit together.", advice="Copy or record it again.")
     rows["frames"] = np.sort(rows["frames"], order="stamp_ns", kind="stable")
     return BagContents(
         **rows,
@@ -145,6 +150,18 @@ def contents_of(directory: Path, found: dict[str, Any]) -> BagContents:
         without_place=counts.get("without_place", 0),
         broken=counts.get("broken", 0),
         first_broken=found["broken"],
+    )
+
+
+def _fits(rows: dict[str, Rows], names: int) -> bool:
+    """Whether all numbers of frames and points are of some that are there."""
+    frames, moves = rows["frames"], [rows["transforms"], rows["poses"]]
+    numbers = [frames["frame"], *(move["parent"] for move in moves), rows["transforms"]["child"]]
+    ends = frames["first"] + frames["count"]
+    return (
+        all(bool(((number >= 0) & (number < names)).all()) for number in numbers)
+        and bool((rows["poses"]["child"] < names).all())
+        and bool(((frames["first"] >= 0) & (frames["count"] >= 0) & (ends <= len(rows["points"]))).all())
     )
 
 
