@@ -19,9 +19,6 @@ from telemetry.recording.ros.bag_types import POINT_TYPES
 from telemetry.recording.ros.placing import MOST_GAP_S
 from telemetry.topics.obstacles import Sensor
 
-ON_EARTH = frozenset({"tif", "geojson"})
-"""Formats that say where on Earth, and how high above the sea."""
-
 
 @dataclass(frozen=True, slots=True)
 class BagOptions:
@@ -46,8 +43,11 @@ class BagOptions:
 
 
 @contextmanager
-def as_recording(path: Path, sensor: Sensor, given: BagOptions, *, kind: str) -> Iterator[Path]:
-    """The path itself; of a bag, a recording that is made of it and is gone afterwards."""
+def as_recording(path: Path, sensor: Sensor, given: BagOptions, *, placed: str | None) -> Iterator[Path]:
+    """The path itself; of a bag, a recording that is made of it and is gone afterwards.
+
+    ``placed``: what must lie somewhere on Earth; None: nothing must.
+    """
     if bag_kind(path) is None:
         _refuse_for_recordings(path, given)
         yield path
@@ -56,9 +56,9 @@ def as_recording(path: Path, sensor: Sensor, given: BagOptions, *, kind: str) ->
         # The name is the bag's: errors say it.
         out = Path(folder) / path.with_suffix(".mcap").name
         flight = _written(path, sensor, given, out)
-        if kind in ON_EARTH and not flight.is_on_earth:
-            what = f"Nothing tells where on Earth, and how high above the sea, the map of a .{kind} lies."
-            advice = "Choose .ply or .bt; or give --home-alt-amsl-m, with a NavSatFix in the bag."
+        if placed is not None and not flight.is_on_earth:
+            what = f"Nothing tells where on Earth, and how high above the sea, {placed} lies."
+            advice = "Give --home-alt-amsl-m, with a NavSatFix in the bag; a .ply or .bt needs no place."
             raise RecordingError(what, where=path.name, advice=advice)
         yield out
 

@@ -21,6 +21,8 @@ from telemetry.perception.rebuilding.rebuild import OtherMap, Rebuilt, rebuild
 from telemetry.perception.sensor_kinds import KINDS, check_memory
 
 NO_BAG = BagOptions()
+ON_EARTH = frozenset({"tif", "geojson"})
+"""Formats that say where on Earth, and how high above the sea."""
 
 
 class MapFileError(DescribedError):
@@ -77,7 +79,7 @@ def build_map(
         cloud_voxel_m,
         whole_flight,
     )
-    with as_recording(recording, sensor, bag, kind=kind) as flight:
+    with as_recording(recording, sensor, bag, placed=f"a .{kind}" if kind in ON_EARTH else None) as flight:
         built = rebuild(flight, KINDS[sensor], other=other, progress=lambda share: progress("Building the map", share))
     end_progress()
     say_notes(*built.notes)
