@@ -9,11 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import zstandard
+from mcap.data_stream import RecordBuilder
+from mcap.records import Chunk, DataEnd, Footer, Header
 
 from telemetry.errors import RecordingError
+from telemetry.recording.file_types import MCAP_MAGIC
 from telemetry.recording.ros.bag import list_bag
 from tests.telemetry.bag_mutants import entries, mutant
-from tests.telemetry.bags import write_bag
+from tests.telemetry.bags import T0_NS, write_bag
 
 COUNT = 300
 
@@ -27,6 +31,23 @@ def test_no_damage_brings_anything_but_words(tmp_path: Path) -> None:
     assert found["faults"] == []
     assert found["placed"] + found["refused"] == COUNT
     assert min(found["placed"], found["refused"]) > COUNT // 20
+
+
+def test_a_chunk_that_unpacks_to_gigabytes_is_refused_within_its_memory(tmp_path: Path) -> None:
+    packed, size = zstandard.ZstdCompressor(level=1).compressobj(), 64 * 2**26
+    data = b"".join([*(packed.compress(bytes(2**26)) for _ in range(64)), packed.flush()])
+    written = RecordBuilder()
+    Header(library="somebody", profile="ros2").write(written)
+    Chunk("zstd", data, T0_NS, T0_NS, uncompressed_crc=0, uncompressed_size=size).write(written)
+    DataEnd(0).write(written)
+    Footer(summary_start=0, summary_offset_start=0, summary_crc=0).write(written)
+    bag = tmp_path / "bomb.mcap"
+    bag.write_bytes(MCAP_MAGIC + written.end() + MCAP_MAGIC)
+    assert bag.stat().st_size < 2_000_000
+    with pytest.raises(RecordingError) as caught:
+        list_bag(bag)
+    assert "more memory than allowed" in caught.value.what
+    assert "Cut a shorter piece" in caught.value.advice
 
 
 @pytest.mark.parametrize("seed", range(3))
