@@ -19,7 +19,7 @@ from server.schemas import Pages, RecorderMessage, RecordingDoc, RecordingsMessa
 from server.work.job_board import JobBoard
 from server.work.jobs import Lane
 from telemetry.topics.messages import RecorderStatus
-from telemetry.topics.requests import StartRecording, StopRecording
+from telemetry.topics.recording_requests import StartRecording, StopRecording
 from telemetry.topics.vehicle import VehicleState
 
 log = logging.getLogger("hedgehop.flying")

@@ -33,7 +33,7 @@ from server.schemas import (
 from server.work.job_board import JobBoard
 from server.work.jobs import Lane, Progress
 from telemetry.topics.messages import ReplayStatus
-from telemetry.topics.requests import CloseRecording, OpenRecording, Play
+from telemetry.topics.recording_requests import CloseRecording, OpenRecording, Play
 
 _SEEK_S = 2.0
 """A jump of the clock beyond what playing explains."""

@@ -13,7 +13,7 @@ from server.work.supervisor import NodeState, Supervisor
 from telemetry.bus.bus import Bus
 from telemetry.bus.node_lock import running_node
 from telemetry.topics.obstacles import SENSORS, Sensor
-from telemetry.topics.requests import RecorderRequest, ReplayRequest, StartRecording
+from telemetry.topics.recording_requests import RecorderRequest, ReplayRequest, StartRecording
 from telemetry.topics.vehicle import RadarKind
 
 LINK, RECORDER, REPLAY, SIMULATOR = "link", "recorder", "replay", "simulator"

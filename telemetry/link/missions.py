@@ -137,6 +137,20 @@ async def check_again(onboard: OnBoard, digest: str, read_mission: ReadMission) 
     check_same_mission(onboard, digest)
 
 
+def check_may_start(onboard: OnBoard, request: StartAuto) -> None:
+    """Raises MissionUnknownError, or NotAllowedError for an item that the mission on board does not have."""
+    if onboard.state != "verified":
+        what = "What is on board is not known." if onboard.state == "unknown" else "There is no mission on board."
+        raise MissionUnknownError(what, advice="Upload the plan, or read the mission back.")
+    if onboard.digest != request.digest:
+        what = "The mission on board is another one than the one that was checked."
+        raise MissionUnknownError(what, advice="Upload the plan again.")
+    items = onboard.mission.items if onboard.mission else ()
+    if not 1 <= request.from_item <= len(items):
+        what = f"The mission on board has {len(items)} items: there is no item {request.from_item}."
+        raise NotAllowedError(what, advice="Start it at an item that it has.")
+
+
 def check_holds(state: VehicleState, *, is_led: bool) -> None:
     """Before what is on board is replaced in flight. ``is_led``: something here still leads the vehicle.
 

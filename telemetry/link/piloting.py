@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from telemetry.errors import MissionUnknownError, NotAllowedError, TelemetryError
+from telemetry.errors import NotAllowedError, TelemetryError
 from telemetry.flight.guided.guided import GuidedScript
 from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_flight
 from telemetry.link.adopted import AdoptedVehicle
@@ -20,6 +20,7 @@ from telemetry.link.missions import (
     ReadMission,
     check_begins,
     check_holds,
+    check_may_start,
     check_same_mission,
     first_item_next,
     same_route,
@@ -173,7 +174,8 @@ class Pilot:
         await self.vehicle.obey(self.vehicle.orders.disarm())
 
     async def start_auto(self, request: StartAuto) -> None:
-        self._check_start(request)
+        check_may_start(self.vehicle.onboard, request)
+        self._check_on_ground()
         self.join = None
         if request.from_item > 1:
             self.join = JoinMission(self.vehicle, request, self._read_mission)
@@ -334,20 +336,6 @@ class Pilot:
             self.script = None
 
     # How they are carried out.
-
-    def _check_start(self, request: StartAuto) -> None:
-        onboard = self.vehicle.onboard
-        if onboard.state != "verified":
-            what = "What is on board is not known." if onboard.state == "unknown" else "There is no mission on board."
-            raise MissionUnknownError(what, advice="Upload the plan, or read the mission back.")
-        if onboard.digest != request.digest:
-            what = "The mission on board is another one than the one that was checked."
-            raise MissionUnknownError(what, advice="Upload the plan again.")
-        self._check_on_ground()
-        items = onboard.mission.items if onboard.mission else ()
-        if not 1 <= request.from_item <= len(items):
-            what = f"The mission on board has {len(items)} items: there is no item {request.from_item}."
-            raise NotAllowedError(what, advice="Start it at an item that it has.")
 
     def _check_on_ground(self) -> None:
         if self.vehicle.state.armed and is_in_the_air(self.vehicle.state):

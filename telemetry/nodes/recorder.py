@@ -20,7 +20,7 @@ from telemetry.recording.mcap_files.continuing import find_unfinished
 from telemetry.recording.mcap_files.mend import mend
 from telemetry.recording.recorder import Recorder
 from telemetry.topics.messages import RecorderStatus, Topic
-from telemetry.topics.requests import RecorderRequest, StartRecording
+from telemetry.topics.recording_requests import RecorderRequest, StartRecording
 
 _log = logging.getLogger(__name__)
 

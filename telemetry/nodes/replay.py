@@ -18,7 +18,7 @@ from telemetry.errors import RecordingError
 from telemetry.recording.player import STATUS_EVERY_S, Due, Player
 from telemetry.recording.replay_sources import ReplaySource, open_source
 from telemetry.topics.messages import REPLAY_PREFIX, ErrorInfo, Published, ReplayStatus, Topic
-from telemetry.topics.requests import CloseRecording, OpenRecording, Play, ReplayRequest
+from telemetry.topics.recording_requests import CloseRecording, OpenRecording, Play, ReplayRequest
 
 _IDLE_STATUS_EVERY_S = 1.0
 _PATIENCE_S = 3.0

@@ -1,4 +1,4 @@
-"""What may be asked of the link, perception, recorder and replay nodes, and by whom. All are frozen dataclasses.
+"""What may be asked of the link and of perception, and by whom. All are frozen dataclasses.
 
 ``Operator.token`` is the fencing token of the server's lease: the link node refuses every request that changes
 anything on a vehicle when its token is lower than the highest one it has seen. Tokens count milliseconds since 1970, so
@@ -395,48 +395,3 @@ class WholeMap:
 
 
 PerceptionRequest = WholeMap
-
-
-# To the recorder node.
-
-
-@dataclass(frozen=True, slots=True)
-class StartRecording:
-    """-> str, the file's name"""
-
-    name: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class StopRecording:
-    """-> None"""
-
-
-RecorderRequest = StartRecording | StopRecording
-
-
-# To the replay node.
-
-
-@dataclass(frozen=True, slots=True)
-class OpenRecording:
-    """-> None; RecordingError"""
-
-    path: str
-
-
-@dataclass(frozen=True, slots=True)
-class CloseRecording:
-    """-> None"""
-
-
-@dataclass(frozen=True, slots=True)
-class Play:
-    """Playing or not, from ``at_utc_s`` on if given, at ``speed`` times the recorded speed. -> None"""
-
-    playing: bool
-    at_utc_s: float | None = None
-    speed: float | None = None
-
-
-ReplayRequest = OpenRecording | CloseRecording | Play

@@ -17,7 +17,8 @@ from server.schemas.stream import ServerMessage
 from telemetry.bus.encoding import EACH_ARRIVES
 from telemetry.topics.messages import MESSAGE_TYPES, REPLAY_PREFIX
 from telemetry.topics.obstacles import PerceptionSettings
-from telemetry.topics.requests import LinkRequest, PerceptionRequest, RecorderRequest, ReplayRequest
+from telemetry.topics.recording_requests import RecorderRequest, ReplayRequest
+from telemetry.topics.requests import LinkRequest, PerceptionRequest
 from tests.conftest import ROOT
 from tests.docs.pages import code_names, rows, text_of
 

@@ -16,7 +16,7 @@ from server.heard.present import Present
 from server.obstacles.replayed import Replayed
 from server.schemas import OpenReview, PlanDoc
 from telemetry.topics.messages import ReplayStatus
-from telemetry.topics.requests import OpenRecording, ReplayRequest
+from telemetry.topics.recording_requests import OpenRecording, ReplayRequest
 from tests.server.fakes import Told
 from tests.server.flight_logs import START_UTC_S, log_of, positions
 from tests.server.test_review import RECORDING

@@ -13,7 +13,8 @@ from telemetry.flight.avoidance import detour as flown
 from telemetry.flight.avoidance import phases
 from telemetry.flight.avoidance.backing import Backing
 from telemetry.flight.avoidance.climb import Climb
-from telemetry.flight.avoidance.detour import Detour, DetourParams
+from telemetry.flight.avoidance.detour import Detour
+from telemetry.flight.avoidance.detour_state import DetourParams
 from telemetry.flight.avoidance.phases import ANY, TABLE, Event, Phase, Sidestep, next_phase
 from telemetry.flight.avoidance.regions import Regions
 from telemetry.flight.guided.helm import Helm

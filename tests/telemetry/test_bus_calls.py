@@ -14,19 +14,8 @@ from telemetry.bus.encoding import encode, error_of
 from telemetry.errors import BusError, MissionUnknownError, RefusedError, SilentError
 from telemetry.topics.messages import ErrorInfo
 from telemetry.topics.onboard_lists import Item, OnboardMission
-from telemetry.topics.requests import (
-    Arm,
-    Connect,
-    Download,
-    LinkRequest,
-    Operator,
-    Pause,
-    Play,
-    ReadParameters,
-    StartRecording,
-    StopRecording,
-    Upload,
-)
+from telemetry.topics.recording_requests import Play, StartRecording, StopRecording
+from telemetry.topics.requests import Arm, Connect, Download, LinkRequest, Operator, Pause, ReadParameters, Upload
 from tests.telemetry.bus_runs import run, short_folder
 
 OPERATOR = Operator("Ada", 7)

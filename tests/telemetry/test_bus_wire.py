@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from telemetry.bus.encoding import decode_message, decode_request, encode_message, encode_request
 from telemetry.errors import BusError
 from telemetry.topics.messages import MESSAGE_TYPES, Published, Topic
-from telemetry.topics.requests import LinkRequest, OpenRecording, Play, ReplayRequest
+from telemetry.topics.recording_requests import OpenRecording, Play, ReplayRequest
+from telemetry.topics.requests import LinkRequest
 from telemetry.topics.vehicle import VehicleState
 
 

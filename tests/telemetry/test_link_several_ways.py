@@ -17,7 +17,8 @@ from telemetry.link.ways.ways import SETTLE_S
 from telemetry.nodes.link import LinkNode, Memory, Wanted, read_memory
 from telemetry.simulation.simulator.autopilot.flight_modes import Hold
 from telemetry.simulation.simulator.run import SimOptions, Simulator, flying
-from telemetry.topics.messages import Candidate, RawFrame, WayStatus
+from telemetry.topics.link_ways import WayStatus
+from telemetry.topics.messages import Candidate, RawFrame
 from telemetry.topics.requests import Arm, Connect, Disarm, Disconnect, Pause, Resume, SetSigning, StartAuto
 from tests.telemetry.bus_runs import run
 from tests.telemetry.fake_vehicle import UdpVehicle

@@ -21,7 +21,8 @@ from telemetry.topics.deltas import FoldedMap
 from telemetry.topics.looks import CloudLook, points_enu_m
 from telemetry.topics.messages import Topic
 from telemetry.topics.obstacles import MapDelta, PerceptionSettings
-from telemetry.topics.requests import StartRecording, StopRecording, WholeMap
+from telemetry.topics.recording_requests import StartRecording, StopRecording
+from telemetry.topics.requests import WholeMap
 from tests.telemetry import perception_flights as flights
 from tests.telemetry.perception_processes import PATIENCE_S, Processes, Sky, fly
 

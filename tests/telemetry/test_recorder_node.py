@@ -16,7 +16,7 @@ from telemetry.bus.bus import Bus
 from telemetry.nodes.recorder import mend_all
 from telemetry.recording.flight_log import read_flight_log
 from telemetry.topics.messages import RawFrame, RecorderStatus, ServerAlive, Topic
-from telemetry.topics.requests import StartRecording, StopRecording
+from telemetry.topics.recording_requests import StartRecording, StopRecording
 from tests.telemetry.recordings import PLAN, heartbeat, state_at, write_flight
 
 PATIENCE_S = 90.0

@@ -17,7 +17,7 @@ from telemetry.errors import RecordingError
 from telemetry.nodes.replay import Replayer, live
 from telemetry.recording.replay_sources import ReplaySource, open_source
 from telemetry.topics.messages import REPLAY_PREFIX, Published, ReplayStatus, ServerAlive, Topic
-from telemetry.topics.requests import CloseRecording, OpenRecording, Play, ReplayRequest
+from telemetry.topics.recording_requests import CloseRecording, OpenRecording, Play, ReplayRequest
 from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.recordings import T0_UTC_S, write_flight
 

@@ -16,7 +16,7 @@ from telemetry.bus.bus import Bus
 from telemetry.recording.mcap_files.reader import open_recording
 from telemetry.topics.messages import ServerAlive, Topic
 from telemetry.topics.obstacles import ObstacleAlert, PerceptionStatus
-from telemetry.topics.requests import StartRecording, StopRecording
+from telemetry.topics.recording_requests import StartRecording, StopRecording
 from telemetry.topics.tracks import TracksStatus
 from tests.telemetry import perception_flights as flights
 from tests.telemetry.moving_flights import frame, straight

@@ -44,7 +44,7 @@ from telemetry.flight.fly import FlyOptions, FlyResult
 from telemetry.flight.fly import fly as conduct
 from telemetry.mavlink.address import parse_address
 from telemetry.recording.flight_log import read_flight_log
-from telemetry.topics.requests import StartRecording, StopRecording
+from telemetry.topics.recording_requests import StartRecording, StopRecording
 
 NODE_TIMEOUT_S = 30.0
 

@@ -15,7 +15,8 @@ from planning.basics.plan_model import Firmware
 from telemetry.errors import NotAllowedError
 from telemetry.flight.avoidance.avoiding_words import Now, status_of
 from telemetry.flight.avoidance.coming_down import joined
-from telemetry.flight.avoidance.detour import Detour, DetourParams
+from telemetry.flight.avoidance.detour import Detour
+from telemetry.flight.avoidance.detour_state import DetourParams
 from telemetry.flight.avoidance.fence_aboard import FenceAboard
 from telemetry.flight.avoidance.pilot_watch import PilotWatch
 from telemetry.flight.avoidance.regions import FASTER_M_S, Regions, Sight, braking_of, largest_speed

@@ -13,6 +13,7 @@ from telemetry.topics.vehicle import VehicleState
 
 BEGINS_M, STANDS_M_S = 1.0, 1.0
 """From where a way begins, and how fast, the vehicle may be: well within the following error of its certificate."""
+OFF_THE_GROUND_M = 0.5
 
 
 def why_moves(state: VehicleState) -> NotAllowedError | None:
@@ -54,3 +55,10 @@ def _why_not_at(begins: Place, state: VehicleState, now_s: float) -> NotAllowedE
         what = f"The vehicle is {where} where the certified way begins."
         return NotAllowedError(what, advice="Ask for the way again: it is certified anew from there.")
     return None
+
+
+def is_off_the_ground(state: VehicleState) -> bool:
+    """By its own word, else by its height above home."""
+    if state.landed is None:
+        return (state.alt_rel_home_m or 0.0) > OFF_THE_GROUND_M
+    return state.landed in ("taking_off", "in_air")

@@ -14,7 +14,7 @@ from typing import Literal
 
 from planning.basics.plan_model import Firmware
 from telemetry.errors import NotAllowedError, SilentError, TelemetryError
-from telemetry.flight.guided.beginning import why_not_from
+from telemetry.flight.guided.beginning import is_off_the_ground, why_not_from
 from telemetry.flight.guided.feed import Feed
 from telemetry.flight.guided.handover import Handover, away_m, is_fresh
 from telemetry.flight.guided.leading import Leading
@@ -29,7 +29,6 @@ from telemetry.topics.requests import FlyWay, StartGuided
 from telemetry.topics.vehicle import VehicleState
 
 TAKEOFF_TOLERANCE_M = 0.3
-OFF_THE_GROUND_M = 0.5
 RETURN_AGAIN_S = 2.0
 SLOW_TARGET_SENDINGS = 4
 THERE = "The way is flown: it holds there."
@@ -295,7 +294,7 @@ class GuidedScript:
     def _take_off(self, now_s: float) -> list[Action]:
         self.phase = "taking_off"
         message = self._orders.take_off(self._takeoff_m, self._home_alt_amsl_m)
-        return self._pending.begin(message, now_s, once=True, confirm=_is_off_the_ground)
+        return self._pending.begin(message, now_s, once=True, confirm=is_off_the_ground)
 
     def _hand_over(self, now_s: float) -> list[Action]:
         target, self._reached_s = self.target, None
@@ -395,9 +394,3 @@ class GuidedScript:
             target = self.target
             return Place(target.lat_deg, target.lon_deg, target.alt_rel_home_m, self._home_alt_amsl_m)
         return Place(state.lat_deg, state.lon_deg, state.alt_rel_home_m, self._home_alt_amsl_m)
-
-
-def _is_off_the_ground(state: VehicleState) -> bool:
-    if state.landed is None:
-        return (state.alt_rel_home_m or 0.0) > OFF_THE_GROUND_M
-    return state.landed in ("taking_off", "in_air")

@@ -10,7 +10,8 @@ from mapping.geometry.frames import apart_m
 from telemetry.link.ways.quality import Reading, RoundTripClock, SequenceQuality
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.reduce import lat_lon
-from telemetry.topics.messages import STALE_S, Candidate, RadioSignal, WayIdentity, WayStatus
+from telemetry.topics.link_ways import RadioSignal, WayIdentity, WayStatus
+from telemetry.topics.messages import STALE_S, Candidate
 
 SILENT_S = 0.7
 """A way that carries many messages is silent after this."""

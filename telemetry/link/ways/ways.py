@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from telemetry.link.ways.copies import ANSWERS, Copies
 from telemetry.link.ways.way import Way
 from telemetry.mavlink.actions import Message
-from telemetry.topics.messages import LOST_S, Candidate, WayStatus
+from telemetry.topics.link_ways import WayStatus
+from telemetry.topics.messages import LOST_S, Candidate
 
 ASK_EVERY_S = 1.0
 SETTLE_S = 5.0
