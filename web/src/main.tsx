@@ -39,6 +39,7 @@ import "./styles/tracks.css";
 import "./styles/traffic.css";
 import "./styles/traversability.css";
 import "./styles/studies.css";
+import "./styles/scenarios.css";
 import "./styles/parameters.css";
 import "./styles/guided.css";
 import "./styles/checklist.css";
