@@ -63,6 +63,27 @@ def choose(page: Page, button: Locator, path: Path) -> None:
     chooser.value.set_files(str(path))
 
 
+def click_surface(page: Page, share: tuple[float, float], answered: Callable[[float], None]) -> None:
+    """At a share of the 3D view's width and height; ``answered`` raises AssertionError unless the page shows so within
+    as many milliseconds.
+
+    A click that met nothing is made again, for the surface was not there yet; one that is only answered late is not: it
+    would count twice.
+    """
+    box = page.get_by_test_id("scene").bounding_box()
+    assert box is not None
+    place = (box["x"] + share[0] * box["width"], box["y"] + share[1] * box["height"])
+
+    def is_taken() -> bool:
+        page.mouse.click(*place)
+        with contextlib.suppress(AssertionError):
+            answered(20_000)
+            return True
+        return False
+
+    wait_until(page, is_taken)
+
+
 # Flying
 
 

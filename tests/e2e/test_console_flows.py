@@ -14,7 +14,7 @@ from PIL import Image
 from playwright.sync_api import Page, expect
 
 from tests.e2e.stations import Station
-from tests.e2e.steps import certified, choose, drawn, open_demo, visit, wait_until
+from tests.e2e.steps import certified, choose, click_surface, drawn, open_demo, visit, wait_until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
@@ -266,18 +266,6 @@ def _photo_like(model: Path, path: Path) -> Path:
 
 
 def _click_corners(page: Page, shares: list[tuple[float, float]]) -> None:
-    box = page.get_by_test_id("scene").bounding_box()
-    assert box is not None
-    for number, (x, y) in enumerate(shares, start=1):
-        place = (box["x"] + x * box["width"], box["y"] + y * box["height"])
-        wait_until(page, lambda number=number, place=place: _corner(page, place, number))
-
-
-def _corner(page: Page, place: tuple[float, float], wanted: int) -> bool:
     rows = page.get_by_test_id("corner-row")
-    if rows.count() < wanted:
-        page.mouse.click(*place)
-        # A view that draws slowly answers late; a second click on the same place would be another corner.
-        with contextlib.suppress(AssertionError):
-            expect(rows).to_have_count(wanted, timeout=20_000)
-    return rows.count() == wanted
+    for number, share in enumerate(shares, start=1):
+        click_surface(page, share, lambda ms, number=number: expect(rows).to_have_count(number, timeout=ms))

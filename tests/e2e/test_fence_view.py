@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 
 from planning.formats.fence_files import read_fence
 from tests.e2e.stations import SimulatedVehicle, Station
-from tests.e2e.steps import certified, choose, connect, drawn, open_demo, upload, wait_until
+from tests.e2e.steps import certified, choose, click_surface, connect, drawn, open_demo, upload
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
@@ -24,7 +24,7 @@ def test_a_fence_drawn_over_the_way_is_judged_at_once_and_undone(
     page.get_by_test_id("view-top").click()
     _open_section(page)
     page.get_by_test_id("tool-fence_polygon").click()
-    _click_corners(page, station, [(0.35, 0.35), (0.65, 0.35), (0.5, 0.65)])
+    _click_corners(page, [(0.35, 0.35), (0.65, 0.35), (0.5, 0.65)])
     expect(page.get_by_test_id("fence-row")).to_have_count(1)
     refused = page.get_by_test_id("error-box")
     expect(refused).to_contain_text("inside exclusion polygon 1 of the fence")
@@ -111,19 +111,9 @@ def _open_section(page: Page) -> None:
     section.get_by_test_id("fence-import").scroll_into_view_if_needed()
 
 
-def _click_corners(page: Page, station: Station, shares: list[tuple[float, float]]) -> None:
+def _click_corners(page: Page, shares: list[tuple[float, float]]) -> None:
     """By clicks on the surface, at shares of the 3D view's width and height."""
-    box = page.get_by_test_id("scene").bounding_box()
-    assert box is not None
     hint = page.get_by_test_id("tool-hint")
-    for left, (x, y) in zip((2, 1, 0), shares, strict=True):
-        told = f"{left} more make it one" if left else "Click the surface to add a corner of the fence"
-
-        def taken(x: float = x, y: float = y, told: str = told, left: int = left) -> bool:
-            is_drawn = told in hint.inner_text() and (left > 0 or page.get_by_test_id("fence-row").count() == 1)
-            if not is_drawn:
-                page.mouse.click(box["x"] + x * box["width"], box["y"] + y * box["height"])
-                page.wait_for_timeout(1500)
-            return is_drawn
-
-        wait_until(page, taken)
+    for left, share in zip((2, 1, 0), shares, strict=True):
+        told = f"corner of the fence: {left} more make it one" if left else "corner of the fence · Esc"
+        click_surface(page, share, lambda ms, told=told: expect(hint).to_contain_text(told, timeout=ms))

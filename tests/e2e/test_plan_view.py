@@ -13,7 +13,7 @@ from playwright.sync_api import Page, expect
 
 from planning.formats.detect import read_mission
 from tests.e2e.stations import Station
-from tests.e2e.steps import choose, visit, wait_until
+from tests.e2e.steps import choose, click_surface, visit, wait_until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
@@ -84,21 +84,10 @@ def _load_model(page: Page, path: Path) -> None:
 def _click_points(page: Page, shares: list[tuple[float, float]]) -> None:
     """Adds points by clicking the surface, at shares of the 3D view's width and height."""
     page.get_by_test_id("tool-add_poi").click()
-    box = page.get_by_test_id("scene").bounding_box()
-    assert box is not None
-    # The surface is there once a click finds it: until then clicks meet nothing.
-    for number, (x, y) in enumerate(shares, start=1):
-        place = (box["x"] + x * box["width"], box["y"] + y * box["height"])
-        wait_until(page, lambda number=number, place=place: _clicked(page, place, number))
-    page.keyboard.press("Escape")
-
-
-def _clicked(page: Page, place: tuple[float, float], wanted: int) -> bool:
     rows = page.get_by_test_id("poi-row")
-    if rows.count() < wanted:
-        page.mouse.click(*place)
-        page.wait_for_timeout(1500)
-    return rows.count() == wanted
+    for number, share in enumerate(shares, start=1):
+        click_surface(page, share, lambda ms, number=number: expect(rows).to_have_count(number, timeout=ms))
+    page.keyboard.press("Escape")
 
 
 def _distance_m(page: Page) -> float:
