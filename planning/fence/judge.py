@@ -83,8 +83,9 @@ def judge_fence(fence: Fence, flight: FencedFlight) -> FenceVerdict:
                 distance_m, shape, part, place_m = found_m, name, kind, nearest.place_m[k]
     at_lat_deg, at_lon_deg = map(float, frame.lat_lon_deg(place_m[None])[0])
     heights_m = flight.line_rel_home_m
-    lowest_m, highest_m = float(heights_m.min()), max(float(heights_m.max()), flight.return_rel_home_m)
-    height_faults = _height_words(fence, lowest_m, highest_m, flight.margin_m)
+    lowest_m, line_highest_m = float(heights_m.min()), float(heights_m.max())
+    highest_m = max(line_highest_m, flight.return_rel_home_m)
+    line_too_high_or_low = bool(_height_words(fence, lowest_m, line_highest_m, flight.margin_m))
     faults = [
         *([_far_words(far)] if far else []),
         *(
@@ -92,11 +93,11 @@ def judge_fence(fence: Fence, flight: FencedFlight) -> FenceVerdict:
             if distance_m < flight.margin_m
             else []
         ),
-        *height_faults,
+        *_height_words(fence, lowest_m, highest_m, flight.margin_m),
     ]
     return FenceVerdict(
         keeps=not faults,
-        line_keeps=not far and not height_faults and line_m >= flight.margin_m,
+        line_keeps=not far and not line_too_high_or_low and line_m >= flight.margin_m,
         margin_m=flight.margin_m,
         min_distance_m=distance_m,
         shape=shape,

@@ -122,7 +122,10 @@ def test_floor_and_ceiling() -> None:
     assert "floor is at 18.1 m" in low.faults[0]
     high = judge_fence(Fence(ceiling_rel_home_m=31.9), line)
     assert "climbs to 30.00 m" in high.faults[0]  # the way home
-    assert not judge_fence(Fence(ceiling_rel_home_m=51.0), replace(line, line_rel_home_m=np.full(3, 49.5))).keeps
+    assert high.line_keeps
+    assert not low.line_keeps
+    higher = judge_fence(Fence(ceiling_rel_home_m=51.0), replace(line, line_rel_home_m=np.full(3, 49.5)))
+    assert (higher.keeps, higher.line_keeps) == (False, False)
 
 
 def test_a_fence_on_the_other_side_of_the_earth_is_not_judged_as_kept() -> None:

@@ -189,6 +189,18 @@ def test_ways_home_lead_around_a_fence_that_hides_home(wish: str) -> None:
     assert asked(flat(), GoTo(8.0, at(dsm, 60.0, 60.0)), start=start, demand=demand).problem == "way"
 
 
+def test_a_way_home_below_a_ceiling_that_the_vehicles_own_return_breaches_is_flown() -> None:
+    dsm = model(flat())
+    clearance = replace(CLEARANCE, rtl_height_m=30.0)
+    demand = replace(DEMAND, clearance=clearance, fence=Fence(ceiling_rel_home_m=25.0))
+    start = here(dsm, 100.0, 60.0, 15.0)
+    way = asked(flat(), ToHome(15.0), start=start, demand=demand)
+    assert (way.problem, way.points_m[-1, 2]) == (None, pytest.approx(115.0))
+    assert any("climbs to 30.00 m" in reason for reason in way.reasons)
+    assert asked(flat(), ToHome(24.5), start=start, demand=demand).problem == "way"
+    assert asked(flat(), GoTo(15.0, at(dsm, 60.0, 60.0)), start=start, demand=demand).problem == "way"
+
+
 def test_a_height_limit_is_not_raised_over() -> None:
     demand = replace(DEMAND, clearance=replace(CLEARANCE, max_height_above_ground_m=10.0))
     way = asked(walled(), GoTo(5.0, at(model(walled()), 100.0, 60.0)), demand=demand)
