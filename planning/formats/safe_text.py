@@ -16,7 +16,8 @@ MAX_ITEMS = 100_000
 MAX_DEPTH = 64
 MAX_NAME_LENGTH = 80
 
-_BRACKETS_OUTSIDE_STRINGS = re.compile(r'"(?:[^"\\]|\\.)*"|[\[{]|[\]}]', re.DOTALL)
+_BRACKETS_OUTSIDE_STRINGS = re.compile(r'"(?:[^"\\]|\\.)*+"?|[\[{]|[\]}]', re.DOTALL)
+"""A string that is not closed ends with the text: its quotes are not tried again, each to the text's end."""
 
 
 def decode_text(name: str, data: bytes | str) -> str:

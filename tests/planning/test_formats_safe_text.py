@@ -1,3 +1,5 @@
+import time
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -27,6 +29,14 @@ def test_bad_json_is_refused(text):
 def test_brackets_inside_strings_are_no_depth():
     text = '["' + "[" * 500 + '\\"' + "]" * 500 + '"]'
     assert load_json("a", text) == ["[" * 500 + '"' + "]" * 500]
+
+
+@pytest.mark.parametrize("unclosed", ['{"' + '\\"' * 50_000, '["a\\'])
+def test_a_string_that_is_never_closed_is_refused_after_one_look_at_it(unclosed):
+    began_s = time.process_time()
+    with pytest.raises(FormatError, match="not valid JSON"):
+        load_json("parameters.json", unclosed)
+    assert time.process_time() - began_s < 1.0
 
 
 @given(st.text(max_size=300))
