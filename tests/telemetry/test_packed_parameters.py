@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from telemetry.errors import RefusedError, TransferError
-from telemetry.mavlink.logs.ftp.payload import MOST_DATA, Opcode, read_payload
+from telemetry.mavlink.logs.ftp.payload import MOST_DATA, NUMBERS, FtpPayload, Nak, Opcode, read_payload
 from telemetry.mavlink.logs.ftp.questions import Numbers
 from telemetry.mavlink.logs.ftp.whole import FtpReadWhole
 from telemetry.mavlink.parameters.packed import MOST_BYTES, PATH, read_packed
@@ -25,7 +25,7 @@ from telemetry.simulation.simulator.protocol.file_protocol import FileProtocol
 from telemetry.simulation.simulator.protocol.made_files import MadeFile, ardupilot_file, packed
 from telemetry.topics.parameters import Parameter
 from tests.telemetry.file_vehicles import FOLDER, FileVehicle
-from tests.telemetry.lossy import VEHICLE, Faults, Run
+from tests.telemetry.lossy import STATION, VEHICLE, Codec, Faults, Run
 
 LOSSY = Faults(loss=0.3, reordering=0.1, duplicates=0.05, corruption=0.01)
 TYPES: dict[Kind, int] = {"int8": 2, "int16": 4, "int32": 6, "float": 9}
@@ -135,6 +135,46 @@ def test_a_file_is_read_to_its_end_whatever_size_was_said(size: int, said: int) 
     run = Run(reader(), MakesFiles(content, said)).until_end()
     assert run.result == content
     assert sizes_of_reads(run) == {MOST_DATA}, "ArduPilot refuses reads of another size than the first"
+
+
+class Sparing(MakesFiles):
+    """Sends less at once than it is asked for; like ArduPilot, it refuses another size of read than the first."""
+
+    def __init__(self, content: bytes, *, most: int, bursts: bool) -> None:
+        super().__init__(content, 3000)
+        self._most, self._bursts = most, bursts
+        self._sizes: set[int] = set()
+
+    def on_message(self, message: Any, now_s: float) -> list[Any]:
+        asked = read_payload(message) if message.get_type() == "FILE_TRANSFER_PROTOCOL" else None
+        if asked is None or asked.opcode not in (Opcode.READ_FILE, Opcode.BURST_READ_FILE):
+            return super().on_message(message, now_s)
+        self._sizes.add(asked.size)
+        refused = len(self._sizes) > 1 or (asked.opcode == Opcode.BURST_READ_FILE and not self._bursts)
+        if refused:
+            data, seq = bytes((Nak.FAIL,)), (asked.seq + 1) % NUMBERS
+            return [FtpPayload(seq, Opcode.NAK, asked.session, 0, 1, data, asked.opcode).message(STATION)]
+        fewer = FtpPayload(asked.seq, asked.opcode, asked.session, asked.offset, self._most)
+        own = fewer.message((message.target_system, message.target_component))
+        return super().on_message(Codec(VEHICLE).parse(Codec(STATION).pack(own)), now_s)
+
+
+@pytest.mark.parametrize("most", [70, 128, 238])
+@pytest.mark.parametrize("bursts", [True, False])
+@pytest.mark.parametrize("faults", [Faults(), LOSSY])
+def test_blocks_that_are_not_full_are_not_the_end(most: int, bursts: bool, faults: Faults) -> None:
+    content = random.Random(most).randbytes(5000)
+    run = Run(reader(), Sparing(content, most=most, bursts=bursts), faults, 3).until_end()
+    assert run.result == content
+
+
+def test_the_simulated_vehicle_refuses_a_read_beyond_the_end_at_offset_0_as_ardupilot_does() -> None:
+    run = Run(reader(), MakesFiles(bytes(500), 3000)).until_end()
+    heard: list[Any] = [read_payload(message) for _, way, message in run.log if way == "down"]
+    refused = [each for each in heard if each.opcode == Opcode.NAK and each.answers == Opcode.READ_FILE]
+    assert refused
+    assert {each.offset for each in refused} == {0}
+    assert run.result == bytes(500)
 
 
 @pytest.mark.parametrize("size", [239 * 40, 9_999])

@@ -21,6 +21,10 @@ class Numbers:
         self._newest = (self._newest + 1) % NUMBERS
         return self._newest
 
+    @property
+    def newest(self) -> int:
+        return self._newest
+
     def hear(self, seq: int) -> None:
         """The vehicle counts on."""
         if is_newer(seq, self._newest):
@@ -51,6 +55,11 @@ class Questions:
     def send(self, opcode: Opcode, *, session: int = 0, offset: int = 0, size: int = 0, data: bytes = b"") -> Send:
         """Without waiting for an answer."""
         return Send(self._payload(opcode, session, offset, size, data).message(self._endpoints.vehicle))
+
+    @property
+    def awaited_seq(self) -> int:
+        """Of the answer to what was sent just now."""
+        return (self._numbers.newest + 1) % NUMBERS
 
     def ask(
         self, now_s: float, opcode: Opcode, *, session: int = 0, offset: int = 0, data: bytes = b""

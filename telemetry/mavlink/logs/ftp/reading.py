@@ -130,9 +130,12 @@ class FtpRead:
             at = min(begin + MOST_DATA, end if end >= 0 else len(self._has))
             if begin not in self._pieces:
                 self._pieces[begin] = now_s
-                where = self._offset + begin
-                out.append(self._questions.send(Opcode.READ_FILE, session=self._session, offset=where, size=at - begin))
+                out.append(self._ask_piece(begin, at - begin))
         return out
+
+    def _ask_piece(self, begin: int, size: int) -> Action:
+        where = self._offset + begin
+        return self._questions.send(Opcode.READ_FILE, session=self._session, offset=where, size=size)
 
     def on_state(self, state: VehicleState, now_s: float) -> list[Action]:
         return [] if self._phase == "over" or not state.armed else self._fail(armed_meanwhile())

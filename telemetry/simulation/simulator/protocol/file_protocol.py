@@ -168,5 +168,6 @@ def _ack(asked: FtpPayload, data: bytes = b"") -> FtpPayload:
 
 
 def _nak(asked: FtpPayload, why: Nak) -> FtpPayload:
+    """Its offset is 0 whatever was asked for, as ArduPilot's is."""
     seq = (asked.seq + 1) % NUMBERS
-    return FtpPayload(seq, Opcode.NAK, asked.session, asked.offset, 1, bytes((why,)), asked.opcode)
+    return FtpPayload(seq, Opcode.NAK, asked.session, 0, 1, bytes((why,)), asked.opcode)
