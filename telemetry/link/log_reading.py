@@ -83,6 +83,11 @@ class LogReading:
         assert isinstance(content, bytes)
         return content
 
+    @property
+    def gave_way(self) -> bool:
+        """Whether the newest reading ended for that alone."""
+        return self._gave_way
+
     def give_way(self) -> None:
         """Something that a flight needs is about to be transferred."""
         if self._machine is not None:
@@ -131,8 +136,9 @@ class LogReading:
             self._vehicle.tell(INFO, f"Logs are read block by block, not as files: {why}.")
 
     async def _run(self, machine: LogListRead | LogRead | FtpList | FtpRead) -> object:
+        self._gave_way = False
         refuse_in_flight(self._vehicle.state)
-        self._machine, self._gave_way = machine, False
+        self._machine = machine
         try:
             return await self._vehicle.exchanges.run(machine)
         finally:

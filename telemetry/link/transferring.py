@@ -141,7 +141,7 @@ class Transfers:
         return found
 
     async def _packed_list(self) -> ParameterList | None:
-        """None: it has no such file, which is told once."""
+        """None: it has no such file, which is told once. Raises TransferError where it gave way to a mission."""
         if not self._has_packed:
             return None
         try:
@@ -150,6 +150,8 @@ class Transfers:
                 return None
             return ParameterList(await asyncio.to_thread(packed.read_packed, content))
         except (RefusedError, SilentError, TransferError, NotAllowedError) as error:
+            if self._files.gave_way:
+                raise
             self._has_packed = isinstance(error, NotAllowedError)
             self._vehicle.tell(INFO, f"Parameters are read one by one, not as a file. {error.what}")
             return None

@@ -8,17 +8,21 @@ import math
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
+from unittest.mock import AsyncMock
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from telemetry.errors import NotAllowedError, TelemetryError
+from telemetry.errors import NotAllowedError, TelemetryError, TransferError
+from telemetry.link.exchanges import Exchanges as RealExchanges
+from telemetry.link.log_reading import LogReading
 from telemetry.link.onboard import OnBoard
 from telemetry.link.transferring import Transfers
 from telemetry.mavlink.actions import Failed, Progress
 from telemetry.topics.messages import TransferStatus
 from telemetry.topics.onboard_lists import Item, OnboardMission, UploadReport
 from telemetry.topics.requests import Operator, Upload, UploadPlaces
+from telemetry.topics.vehicle import VehicleState
 
 KNOWN = OnboardMission((), None, None, None, "known")
 REPORT = UploadReport(True, OnboardMission((), None, None, None, ""), (), (), 0.1)
@@ -117,3 +121,35 @@ async def _fence_known() -> None:
     await sending
     assert fence.unknown == ""
     assert fence.why_not((47.0, 8.0), ((47.0, 8.0), there, there)) == ""
+
+
+def test_a_file_of_parameters_that_gives_way_to_an_upload_is_not_replaced_by_another_reading() -> None:
+    asyncio.run(_file_gives_way())
+
+
+async def _file_gives_way() -> None:
+    sent: list[str] = []
+    told: list[str] = []
+    vehicle = SimpleNamespace(
+        firmware="ardupilot",
+        target=(1, 1),
+        exchanges=RealExchanges(lambda message: sent.append(message.get_type()), lambda: 0.0),
+        onboard=OnBoard(),
+        state=VehicleState(1, 1, autopilot="ardupilot", heartbeat_t_mono_s=1.0),
+        capabilities=mavlink.MAV_PROTOCOL_CAPABILITY_FTP,
+        wait_until=AsyncMock(),
+        tell=lambda _, text: told.append(text),
+    )
+    transfers = Transfers(cast(Any, vehicle), lambda _: None, LogReading(cast(Any, vehicle)))
+    for _ in range(2):
+        reading = asyncio.create_task(transfers.list_parameters())
+        while sent[-1:] != ["FILE_TRANSFER_PROTOCOL"]:
+            await asyncio.sleep(0)
+        sending = asyncio.create_task(transfers.upload_places(FENCE))
+        with pytest.raises(TransferError, match="a mission is being transferred"):
+            await reading
+        assert sent[-1] == "MISSION_COUNT"
+        assert "PARAM_REQUEST_LIST" not in sent
+        sending.cancel()
+        await asyncio.gather(sending, return_exceptions=True)
+    assert told == []
