@@ -37,20 +37,23 @@ def kept_descriptions(root: Path, autopilot: Autopilot) -> tuple[dict[str, Descr
         return {}, f"the kept descriptions of parameters are not used: {error}"
 
 
-def keep_vehicle_descriptions(root: Path, autopilot: Autopilot, crc: int, data: bytes) -> dict[str, Description]:
-    """The vehicle's own, found again by its CRC. Blocks. Raises FormatError, StorageError."""
-    found = read_descriptions("the vehicle's own description", data)
+def own_descriptions(data: bytes) -> dict[str, Description]:
+    """Of a vehicle of itself, as it came. Blocks. Raises FormatError."""
+    return read_descriptions("the vehicle's own description", data)
+
+
+def keep_vehicle_descriptions(root: Path, autopilot: Autopilot, crc: int, data: bytes) -> None:
+    """Found again by their CRC. Blocks. Raises StorageError, OSError."""
     kept = _vehicle_file(root, autopilot, crc)
     kept.parent.mkdir(mode=0o700, exist_ok=True)
     write_atomically(kept, data)
     for old in sorted(_vehicle_files(root, autopilot), key=lambda path: path.stat().st_mtime)[:-MOST_KEPT]:
         old.unlink(missing_ok=True)
-    return found
 
 
 def vehicle_descriptions(root: Path, autopilot: Autopilot, crc: int) -> dict[str, Description]:
     """As kept. Blocks. Raises FormatError, OSError."""
-    return read_descriptions("the vehicle's own description", _vehicle_file(root, autopilot, crc).read_bytes())
+    return own_descriptions(_vehicle_file(root, autopilot, crc).read_bytes())
 
 
 def known_crcs(root: Path, autopilot: Autopilot) -> tuple[int, ...]:

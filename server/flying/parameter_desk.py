@@ -16,12 +16,13 @@ from planning.basics.plan_model import Firmware
 from planning.errors import FormatError
 from planning.formats.wpl import read_wpl
 from planning.missions.vehicle_profile import parse_profile
-from server.errors import ConflictError, NotReadyError
+from server.errors import ConflictError, NotReadyError, StorageError
 from server.flying.descriptions import (
     keep_descriptions,
     keep_vehicle_descriptions,
     kept_descriptions,
     known_crcs,
+    own_descriptions,
     vehicle_descriptions,
 )
 from server.heard.channel import Channel
@@ -178,10 +179,15 @@ class ParameterDesk:
             found = await self._link.call(ReadMetadata(known))
             if not found.content:
                 return await asyncio.to_thread(vehicle_descriptions, self._root, autopilot, found.crc)
-            return await asyncio.to_thread(keep_vehicle_descriptions, self._root, autopilot, found.crc, found.content)
+            described = await asyncio.to_thread(own_descriptions, found.content)
         except (TelemetryError, FormatError, OSError) as error:
             _log.info("The vehicle's own description of its parameters is not used: %s", error)
             return {}
+        try:
+            await asyncio.to_thread(keep_vehicle_descriptions, self._root, autopilot, found.crc, found.content)
+        except (StorageError, OSError) as error:
+            _log.warning("The vehicle's own description of its parameters is used but not kept: %s", error)
+        return described
 
     def _vehicle(self) -> tuple[str, VehicleState]:
         vehicle, state = self._aboard.vehicle, self._live.state

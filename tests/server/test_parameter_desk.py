@@ -13,7 +13,8 @@ from typing import Any
 import pytest
 
 from planning.errors import FormatError
-from server.errors import NotReadyError
+from server.errors import NotReadyError, StorageFullError
+from server.flying import descriptions
 from server.flying.descriptions import MOST_KEPT, known_crcs
 from server.flying.parameter_desk import ParameterDesk
 from server.schemas.parameter_docs import FindingDoc, ParameterChangeDoc, ParametersDoc
@@ -213,11 +214,12 @@ def test_vehicles_with_other_firmware_are_compared_with_a_word_of_caution(tmp_pa
     run(play())
 
 
-def test_what_the_vehicle_says_of_itself_goes_before_the_makers_file_and_is_kept(tmp_path: Path) -> None:
-    def own(crc: int, words: str) -> VehicleMetadata:
-        entry = {"name": "RTL_ALT", "shortDesc": words, "units": "m", "default": 1500}
-        return VehicleMetadata(crc, gzip.compress(json.dumps({"parameters": [entry]}).encode()))
+def own(crc: int, words: str) -> VehicleMetadata:
+    entry = {"name": "RTL_ALT", "shortDesc": words, "units": "m", "default": 1500}
+    return VehicleMetadata(crc, gzip.compress(json.dumps({"parameters": [entry]}).encode()))
 
+
+def test_what_the_vehicle_says_of_itself_goes_before_the_makers_file_and_is_kept(tmp_path: Path) -> None:
     async def play() -> None:
         bench = Bench(tmp_path)
         await bench.desk.read()
@@ -236,3 +238,24 @@ def test_what_the_vehicle_says_of_itself_goes_before_the_makers_file_and_is_kept
         assert len(known_crcs(tmp_path, "ardupilot")) == MOST_KEPT
 
     run(play())
+
+
+def test_what_was_read_is_shown_even_if_the_vehicles_description_cannot_be_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def full(path: Path, data: bytes) -> None:
+        raise StorageFullError("The disk is full.", where=path.name, advice="Free some space.")
+
+    async def play() -> None:
+        bench = Bench(tmp_path)
+        bench.link.own = own(5, "Its own words")
+        doc = await bench.desk.read()
+        assert next(p.title for p in doc.parameters if p.name == "RTL_ALT") == "Its own words"
+        assert await bench.desk.doc() == doc
+        (said,) = [record for record in caplog.records if record.levelname == "WARNING"]
+        assert "not kept" in said.message
+        assert "The disk is full" in said.message
+
+    monkeypatch.setattr(descriptions, "write_atomically", full)
+    run(play())
+    assert known_crcs(tmp_path, "ardupilot") == ()
