@@ -14,13 +14,16 @@ from planning.errors import PoiError
 from planning.fence.home_plane import HomePlane, plane_at
 from planning.fence.zones import Flat, flat_shapes
 from planning.route.around_fence import Blocked, Kept, backs_of, blocked_of, longest_way_m
+from planning.route.poi import MIN_APART_M
 from planning.route.survey import MIN_LINE_M
 from planning.terrain.dsm import SurfaceModel
 
 LONGER = 2.0
 """Ways around may be longer than any line: by this much at most they are taken to be."""
 INSIDE_M = 1e-3
-"""An end that was cut lies so far beyond what is forbidden."""
+"""An end that was cut lies at least so far beyond what is forbidden."""
+APART_M = MIN_APART_M + 0.05
+"""The ends on both sides of a cut are at least so far apart, with what rounding may take."""
 
 
 def fenced_lines(model: SurfaceModel, pois: Sequence[Poi], kept: Kept, *, ways_back: bool) -> tuple[Poi, ...]:
@@ -33,11 +36,14 @@ def fenced_lines(model: SurfaceModel, pois: Sequence[Poi], kept: Kept, *, ways_b
     ends_m, backs_m = plane.xy_m([(poi.lat_deg, poi.lon_deg) for poi in pois]), backs_of(plane, kept)
     flats = flat_shapes(kept.fence, plane, LONGER * longest_way_m(ends_m, backs_m))
     blocked = blocked_of(model, plane, flats, np.empty((0, 2)), backs_m, kept)
+    sides_m = list(zip(ends_m[::2], ends_m[1::2], strict=True))
+    found = [_parts(blocked, a, b, ways_back=ways_back) for a, b in sides_m]
+    middles_m = [a + sum(part) / 2 * (b - a) for (a, b), parts in zip(sides_m, found, strict=True) for part in parts]
+    may = iter(_may(flats, np.array(middles_m).reshape(-1, 2), kept.margin_m))
     left = []
-    for k in range(0, len(pois) - 1, 2):
-        parts = _parts(blocked, flats, ends_m[k], ends_m[k + 1], kept.margin_m, ways_back=ways_back)
-        whole = parts == [(0.0, 1.0)]
-        left += pois[k : k + 2] if whole else _ends(plane, pois[k : k + 2], ends_m[k : k + 2], parts)
+    for k, each in enumerate(found):
+        line, parts = pois[2 * k : 2 * k + 2], [part for part in each if next(may)]
+        left += line if parts == [(0.0, 1.0)] else _ends(plane, line, ends_m[2 * k : 2 * k + 2], parts)
     if not left:
         raise PoiError(
             "The fence leaves nothing of the survey: no part of its lines may be flown.",
@@ -52,28 +58,32 @@ def lines_m(model: SurfaceModel, pois: Sequence[Poi]) -> float:
     return float(np.linalg.norm(xy_m[1::2] - xy_m[::2], axis=1).sum())
 
 
-def _parts(
-    blocked: Blocked, flats: list[Flat], a: F64, b: F64, margin_m: float, *, ways_back: bool
-) -> list[tuple[float, float]]:
-    """Shares of a line that may be flown and are long enough to be lines."""
+def _parts(blocked: Blocked, a: F64, b: F64, *, ways_back: bool) -> list[tuple[float, float]]:
+    """Shares of a line between its cuts that are long enough to be lines."""
     field = blocked.seeing if ways_back and blocked.seeing is not None else blocked.alone
     out = [*field.blocked(a, b), *(part for disc in blocked.discs for part in disc.left_out(a, b))]
     length_m = float(np.linalg.norm(b - a))
-    spare = INSIDE_M / length_m
     parts, begins = [], 0.0
-    for first, last in sorted([*((p, q) for p, q in out if q > p), (math.inf, math.inf)]):
-        ends = min(1.0, first - spare)
-        if (ends - begins) * length_m >= MIN_LINE_M - spare and _may(
-            flats, a + (begins + ends) / 2 * (b - a), margin_m
-        ):
+    for first, last in sorted([*(_cut(p, q, length_m) for p, q in out if q > p), (math.inf, math.inf)]):
+        ends = min(1.0, first)
+        if (ends - begins) * length_m >= MIN_LINE_M - INSIDE_M:
             parts.append((begins, ends))
-        begins = max(begins, last + spare)
+        begins = max(begins, last)
     return parts
 
 
-def _may(flats: list[Flat], place_m: F64, margin_m: float) -> bool:
+def _cut(first: float, last: float, length_m: float) -> tuple[float, float]:
+    """So wide that what it parts can be told apart."""
+    wider = max(INSIDE_M, (APART_M - (last - first) * length_m) / 2) / length_m
+    return first - wider, last + wider
+
+
+def _may(flats: list[Flat], places_m: F64, margin_m: float) -> list[bool]:
     """Edges part what is forbidden from what is not: one place of a part stands for all of it."""
-    return all(float(flat.room_m(place_m[None])[0]) >= margin_m for flat in flats)
+    may = np.ones(len(places_m), np.bool_)
+    for flat in flats:
+        may &= flat.room_m(places_m) >= margin_m
+    return may.tolist()
 
 
 def _ends(plane: HomePlane, line: Sequence[Poi], ends_m: F64, parts: list[tuple[float, float]]) -> list[Poi]:

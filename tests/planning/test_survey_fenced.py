@@ -11,11 +11,13 @@ import pytest
 from planning.basics.plan_model import Poi
 from planning.errors import PoiError
 from planning.fence.fence_model import Fence, circle
+from planning.fence.zones import ROUNDING_M, Flat
 from planning.ground.demo_hillside import demo_dsm, demo_survey_polygon
 from planning.missions.vehicle_profile import load_profile, path_params
 from planning.planner.plan import plan_mission
 from planning.planner.request import PlanRequest, survey_request
 from planning.route.around_fence import Kept
+from planning.route.poi import MIN_APART_M
 from planning.route.survey import survey_lines
 from planning.route.survey_fenced import fenced_lines, lines_m
 from tests.planning.test_around_fence import FLAT, HOME, HOME_XY_M, MARGIN_M, at, disc, ring
@@ -121,3 +123,34 @@ def test_a_survey_around_a_kept_out_place_is_certified_and_says_what_it_loses() 
     assert left_m < whole_m
     assert any(f"leaves {left_m:.0f} m of the survey's {whole_m:.0f} m" in said for said in plan.warnings)
     assert plan.coverage is not None
+
+
+def test_a_line_that_only_grazes_what_is_forbidden_is_parted_into_ends_that_can_be_told_apart() -> None:
+    """The corner of a square that stands on it, with a margin of nothing."""
+    fence, cuts_m = Fence((ring((0, 30), (8, 38), (0, 46), (-8, 38)),)), []
+    for north_m in np.linspace(30.0 - ROUNDING_M - 0.01, 30.1, 60).tolist():
+        pois = lines((-40, north_m), (40, north_m))
+        got = fenced_lines(FLAT, pois, Kept(fence, HOME, (), 0.0, 3.0), ways_back=False)
+        apart_m = np.linalg.norm(np.diff(places_m(got), axis=0), axis=1).tolist()
+        assert sum(apart_m) == pytest.approx(80.0, abs=0.01)
+        cuts_m += apart_m[1:2]
+    assert len(cuts_m) > 40
+    assert 0.1 < cuts_m[0] < 0.2
+    assert min(cuts_m) > MIN_APART_M
+
+
+def test_every_part_of_all_lines_is_held_against_a_shape_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+    room_m = Flat.room_m
+
+    def counted(flat: Flat, places: np.ndarray) -> np.ndarray:
+        asked.append(len(places))
+        return room_m(flat, places)
+
+    shapes = (disc(0.0, 30.0, 3.0), disc(20.0, 40.0, 3.0))
+    pois = lines((-40, 30), (40, 30), (40, 40), (-40, 40), (-40, 50), (40, 50))
+    monkeypatch.setattr(Flat, "room_m", counted)
+    got = left(Fence(circles=shapes), pois, ways_back=False)
+    assert len(got) == 10
+    assert asked[-2:] == [5, 5]
+    assert 1 not in asked[-len(shapes) :]
