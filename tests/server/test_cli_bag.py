@@ -78,6 +78,13 @@ def test_a_bag_becomes_a_recording_that_review_opens(bag: Path, tmp_path: Path) 
     assert "Give --out as well" in hedgehop("bag", bag, "--points", "/points").err
 
 
+def test_the_folder_that_one_is_in_is_a_bag_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(write_bag(tmp_path, "mcap", Flight().entries("mcap")))
+    asked = ("map", ".", "--sensor", "radar", "--out", tmp_path / "a.ply")
+    assert hedgehop(*asked, "--points", "/points").code == 0
+    assert "run: Which points" in hedgehop(*asked).err
+
+
 def test_recordings_take_no_options_of_bags_and_are_no_bags(tmp_path: Path) -> None:
     flight = write_flight(tmp_path / "flight.mcap", seconds=2)
     run = hedgehop("map", flight, "--sensor", "radar", "--points", "/points", "--out", tmp_path / "a.ply")

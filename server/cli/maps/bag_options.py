@@ -52,6 +52,7 @@ def as_recording(path: Path, sensor: Sensor, given: BagOptions, *, placed: str |
         _refuse_for_recordings(path, given)
         yield path
         return
+    path = path.resolve()  # "." has no name
     with tempfile.TemporaryDirectory(prefix="hedgehop-bag-") as folder:
         # The name is the bag's: errors say it.
         out = Path(folder) / path.with_suffix(".mcap").name
