@@ -184,14 +184,22 @@ def test_a_decoder_that_dies_is_an_error(
     assert list(temporary.iterdir()) == []
 
 
-def test_a_full_disk_is_named_and_leaves_nothing(
-    tmp_path: Path, temporary: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("refusing", "match"),
+    [
+        ("resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))", r"larger than is allowed.*ulimit"),
+        ("fail = lambda *_: (_ for _ in ()).throw(OSError(28, 'full')); from planning.terrain.rasters import decode;"
+         " decode.JOBS = dict.fromkeys(decode.JOBS, fail)", r"no room for the heights.*TMPDIR"),
+    ],
+    ids=["file size", "disk"],
+)  # fmt: skip
+def test_a_file_that_cannot_grow_is_named_and_leaves_nothing(
+    tmp_path: Path, temporary: Path, monkeypatch: pytest.MonkeyPatch, refusing: str, match: str
 ) -> None:
     path = write_raster(tmp_path / "x.tif", hill())
-    full = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096)); "
     run = "import runpy; runpy.run_module('planning.terrain.rasters.worker', run_name='__main__')"
-    monkeypatch.setattr(sandbox, "_COMMAND", [sys.executable, "-P", "-c", full + run])
-    with pytest.raises(RasterError, match=r"no room for the heights.*TMPDIR"):
+    monkeypatch.setattr(sandbox, "_COMMAND", [sys.executable, "-P", "-c", f"import resource; {refusing}; {run}"])
+    with pytest.raises(RasterError, match=match):
         read_dsm(path)
     assert list(temporary.iterdir()) == []
 

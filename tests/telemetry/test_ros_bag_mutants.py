@@ -50,6 +50,17 @@ def test_a_chunk_that_unpacks_to_gigabytes_is_refused_within_its_memory(tmp_path
     assert "Cut a shorter piece" in caught.value.advice
 
 
+def test_files_that_are_packed_as_a_whole_are_not_unpacked(tmp_path: Path) -> None:
+    bag = write_bag(tmp_path, "db3", entries("db3"))
+    about = bag / "metadata.yaml"
+    said = about.read_text()
+    assert "compression_mode: ''" in said
+    about.write_text(said.replace("compression_mode: ''", "compression_mode: FILE"))
+    with pytest.raises(RecordingError, match="compressed as a whole") as caught:
+        list_bag(bag)
+    assert "ros2 bag convert" in caught.value.advice
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_through_the_confined_process_as_well(tmp_path: Path, seed: int) -> None:
     bag = write_bag(tmp_path, "ros1", entries("ros1"))

@@ -100,7 +100,13 @@ def _explain(error: Exception, job: str) -> Json:
             "what": f"Decoding needs more memory than allowed ({cause}).",
             "advice": _SMALLER[kind],
         }
-    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+    if isinstance(error, OSError) and error.errno == errno.EFBIG:
+        return {
+            "kind": "too_large",
+            "what": "A file that is written for it becomes larger than is allowed.",
+            "advice": _SMALLER[kind] if kind == "bag" else "Raise the limit on the size of files (ulimit -f).",
+        }
+    if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
         return {
             "kind": "disk",
             "what": "The disk is full: there is no room for the heights.",

@@ -11,6 +11,7 @@ from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.rosbag1 import Reader as Ros1Reader
 from rosbags.rosbag2 import Reader as Ros2Reader
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+from ruamel.yaml import YAML
 
 from telemetry.errors import RecordingError
 from telemetry.recording.ros.bag_types import LONGEST_NAME, MOST_TOPICS
@@ -75,6 +76,17 @@ class OpenBag:
 @contextmanager
 def open_bag(path: Path, kind: str) -> Iterator[OpenBag]:
     """``kind``: ros1, or any kind of ROS 2."""
+    if kind == "folder":
+        _refuse_packed_files(path)
     with ExitStack() as stack:
         reader = stack.enter_context(Ros1Reader(path) if kind == "ros1" else Ros2Reader(path))
         yield OpenBag(reader)
+
+
+def _refuse_packed_files(folder: Path) -> None:
+    """rosbags would unpack all of them on opening, however much they become."""
+    found = YAML(typ="safe").load((folder / "metadata.yaml").read_text())
+    about = found.get("rosbag2_bagfile_information") if isinstance(found, dict) else None
+    if isinstance(about, dict) and str(about.get("compression_mode")).lower() == "file":
+        what = "Its files are compressed as a whole (compression_mode: file)."
+        raise RecordingError(what, advice="Write it anew with compression_mode: message or none (ros2 bag convert).")
