@@ -148,6 +148,42 @@ def test_home_is_the_fix_and_the_height_that_is_given(tmp_path: Path) -> None:
     assert (origin.lat_deg, origin.lon_deg, origin.alt_amsl_m) == (45.0, 10.0, 432.0)
 
 
+@pytest.mark.parametrize(("late_s", "most_gap_s"), [(0.4, 0.5), (0.6, 0.5), (900.0, 0.5), (900.0, 1000.0)])
+def test_a_fix_of_another_time_is_no_home(tmp_path: Path, late_s: float, most_gap_s: float) -> None:
+    t_ns, m = T0_NS + round(late_s * S), Messages("ros1")
+    entries = [entry for entry in Flight().entries("ros1") if entry[0] != "/fix"]
+    bag = write_bag(tmp_path, "ros1", [*entries, ("/fix", t_ns, m.fix(t_ns, 45.0, 10.0, 480.0))])
+    asked: dict[str, Any] = {"home_alt_amsl_m": 432.0, "most_gap_s": most_gap_s}
+    if late_s < most_gap_s:
+        assert flown(bag, tmp_path / "a.mcap", **asked).is_on_earth
+        return
+    with pytest.raises(RecordingError, match=f"is {late_s:.3f} s away") as caught:
+        flown(bag, tmp_path / "a.mcap", **asked)
+    assert "--max-gap-s" in caught.value.advice
+    assert not flown(bag, tmp_path / "a.mcap").is_on_earth
+
+
+@pytest.mark.parametrize(("lat_deg", "lon_deg"), [(90.5, 10.0), (45.0, -180.5), (1e300, 0.0)])
+def test_a_fix_nowhere_on_earth_is_none(tmp_path: Path, lat_deg: float, lon_deg: float) -> None:
+    m, entries = Messages("ros1"), Flight().entries("ros1")
+    nowhere = ("/fix", T0_NS, m.fix(T0_NS, lat_deg, lon_deg, 480.0))
+    bag = write_bag(tmp_path, "ros1", [nowhere, *(entry for entry in entries if entry[0] != "/fix")])
+    flight = flown(bag, tmp_path / "a.mcap", home_alt_amsl_m=432.0)
+    assert not flight.is_on_earth
+    assert any("1 messages contradict themselves" in note and "no place on Earth" in note for note in flight.notes)
+
+
+def test_another_frame_than_that_of_the_poses_is_reached_through_the_transforms(tmp_path: Path) -> None:
+    flight, out = Flight(), tmp_path / "a.mcap"
+    flown(write_bag(tmp_path, "mcap", flight.entries("mcap")), out, "vision", base="radar")
+    with open_recording(out) as recording:
+        poses: list[Any] = [entry.message for entry in recording.entries((Topic.SLAM_POSE,))]
+    base_m = np.column_stack([np.interp(flight.clouds_s, POSES_S, flight.places[:, k]) for k in range(3)])
+    radar_m = base_m + Slerp(POSES_S, flight.turns)(flight.clouds_s).apply(flight.mount_m)
+    first_m = flight.places[0] + flight.turns[0].apply(flight.mount_m)
+    assert np.array([pose.position_m for pose in poses]) == pytest.approx(radar_m - first_m, abs=1e-6)
+
+
 def test_a_gap_leaves_clouds_out_and_says_where(tmp_path: Path) -> None:
     entries = [e for e in Flight().entries("mcap") if e[0] != "/odom" or not 0.9 < (e[1] - T0_NS) / S < 2.1]
     bag = write_bag(tmp_path, "mcap", entries)
@@ -177,7 +213,13 @@ def test_stamps_of_zero_give_way_to_the_time_of_recording(tmp_path: Path) -> Non
         ({"points": "/odom"}, "/odom is of nav_msgs/msg/Odometry, which holds no points", "/points"),
         ({"pose": "/points"}, "which holds no poses", "/odom (Odometry, 61)"),
         ({"pose": "/tf_static", "base": "drone"}, "No transform tells of the robot's frame drone", "base_link, radar"),
-        ({"base": "drone"}, "no transform from radar to drone at any time", "--frame"),
+        (
+            {"base": "drone"},
+            "The poses are of the frame base_link, and no transform leads from there to drone",
+            "radar",
+        ),
+        ({"pose": "/tf_static"}, "Nothing tells where the robot was: no transform leads from base_link on", "--pose"),
+        ({"pose": "/tf_static", "base": "radar"}, "all transforms from radar to base_link are static", "--pose"),
         ({"most_gap_s": float("nan")}, "nan s is none", "0.5"),
         ({"most_gap_s": 0.01}, "No cloud can be placed: no transform from base_link to odom between", "--max-gap-s"),
     ],
@@ -309,7 +351,12 @@ def test_what_is_no_bag_is_refused(tmp_path: Path, content: bytes) -> None:
 
 def test_what_the_decoding_process_says_is_not_believed_unseen(tmp_path: Path) -> None:
     rows = {name: np.zeros(2, kind) for name, kind in TABLES.items()}
-    for name, column, value in (("frames", "frame", 3), ("frames", "count", 3), ("transforms", "child", -1)):
+    for name, column, value in (
+        ("frames", "frame", 3),
+        ("frames", "count", 3),
+        ("transforms", "child", -1),
+        ("places", "lat_deg", 91.0),
+    ):
         for each, table in rows.items():
             changed = table.copy()
             if each == name:

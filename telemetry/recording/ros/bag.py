@@ -17,7 +17,7 @@ from planning.terrain.rasters import sandbox
 from planning.terrain.rasters.header import RasterLimits
 from telemetry.errors import RecordingError
 from telemetry.recording.file_types import MCAP_MAGIC
-from telemetry.recording.ros.bag_types import FIX, KNOWN_TYPES, TABLES
+from telemetry.recording.ros.bag_types import FIX, KNOWN_TYPES, MOST_LAT_DEG, MOST_LON_DEG, TABLES
 
 BagKind = Literal["ros1", "folder", "mcap", "db3"]
 Progress = Callable[[float], None]
@@ -154,13 +154,15 @@ def contents_of(directory: Path, found: dict[str, Any]) -> BagContents:
 
 
 def _fits(rows: dict[str, Rows], names: int) -> bool:
-    """Whether all numbers of frames and points are of some that are there."""
+    """Whether all numbers of frames and points are of some that are there, and all places on Earth."""
     frames, moves = rows["frames"], [rows["transforms"], rows["poses"]]
     numbers = [frames["frame"], *(move["parent"] for move in moves), rows["transforms"]["child"]]
     ends = frames["first"] + frames["count"]
+    lat_deg, lon_deg = rows["places"]["lat_deg"], rows["places"]["lon_deg"]
     return (
         all(bool(((number >= 0) & (number < names)).all()) for number in numbers)
         and bool((rows["poses"]["child"] < names).all())
+        and bool(((np.abs(lat_deg) <= MOST_LAT_DEG) & (np.abs(lon_deg) <= MOST_LON_DEG)).all())
         and bool(((frames["first"] >= 0) & (frames["count"] >= 0) & (ends <= len(rows["points"]))).all())
     )
 

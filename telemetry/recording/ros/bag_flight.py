@@ -76,9 +76,9 @@ def write_bag_flight(
             most_gap_s=asked.most_gap_s,
         )
         _check_radar(bag, sensor)
+        home = _home(contents, bag, asked)
     except RecordingError as error:
         raise RecordingError(error.what, where=error.where or path.name, advice=error.advice) from error
-    home = _home(contents, bag, asked.home_alt_amsl_m)
     return _write(bag, home, sensor, out, is_on_earth=home != _NOWHERE, fault=table.fault)
 
 
@@ -116,12 +116,21 @@ def _check_radar(bag: PlacedBag, sensor: Sensor) -> None:
         raise RecordingError(what, advice="Map it with --sensor vision, as dense clouds are.")
 
 
-def _home(contents: BagContents, bag: PlacedBag, alt_amsl_m: float | None) -> tuple[float, float, float]:
-    """By the NavSatFix nearest to the first pose; without one, or without its height above the sea, nowhere."""
-    if not len(contents.places) or alt_amsl_m is None:
+def _home(contents: BagContents, bag: PlacedBag, asked: BagAsked) -> tuple[float, float, float]:
+    """By the NavSatFix nearest to the first pose; without one, or without its height above the sea, nowhere.
+
+    Raises RecordingError where it is of another time.
+    """
+    if not len(contents.places) or asked.home_alt_amsl_m is None:
         return _NOWHERE
-    nearest = contents.places[int(np.argmin(np.abs(contents.places["stamp_ns"] - bag.origin_ns)))]
-    return float(nearest["lat_deg"]), float(nearest["lon_deg"]), alt_amsl_m
+    apart_s = np.abs(contents.places["stamp_ns"] - bag.origin_ns) / 1e9
+    nearest = int(np.argmin(apart_s))
+    if apart_s[nearest] > asked.most_gap_s:
+        what = f"The NavSatFix nearest to the first pose is {apart_s[nearest]:,.3f} s away from it."
+        advice = f"At most {asked.most_gap_s:g} s are bridged; --max-gap-s bridges more, and without --home-alt-amsl-m"
+        raise RecordingError(what, advice=f"{advice} no fix is needed.")
+    place = contents.places[nearest]
+    return float(place["lat_deg"]), float(place["lon_deg"]), asked.home_alt_amsl_m
 
 
 def _write(

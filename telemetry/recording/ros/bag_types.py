@@ -24,6 +24,7 @@ MOST_POINTS, MOST_ROWS = 50_000_000, 5_000_000
 """Of one reading: points of all clouds together; clouds, transforms and poses, each."""
 FARTHEST_M = 1e7
 """Of any place from the origin of its frame; beyond is no place on Earth."""
+MOST_LAT_DEG, MOST_LON_DEG = 90.0, 180.0
 MOST_BYTES = 4_000_000_000
 """Of a file that the decoding process writes."""
 

@@ -21,6 +21,8 @@ from telemetry.recording.ros.bag_types import (
     FRAME,
     LONGEST_NAME,
     MOST_BYTES,
+    MOST_LAT_DEG,
+    MOST_LON_DEG,
     MOST_NAMES,
     MOST_POINTS,
     MOST_ROWS,
@@ -149,6 +151,8 @@ class _Sorter:
             self._transform("poses", stamp, message.header, child, pose.position, pose.orientation, topic)
         elif kind == FIX and int(message.status.status) >= 0:
             place = (float(message.latitude), float(message.longitude), float(message.altitude))
+            if abs(place[0]) > MOST_LAT_DEG or abs(place[1]) > MOST_LON_DEG:
+                raise MalformedMessageError(f"latitude {place[0]:g}°, longitude {place[1]:g}° is no place on Earth")
             if all(map(math.isfinite, place)):
                 self._put("places", np.array([(self._stamp(message.header, t_ns), *place)], PLACE))
 

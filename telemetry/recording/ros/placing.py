@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from telemetry.recording.ros.transforms import Gap, Track, Transform, Way, track
 BASE_LINK = "base_link"
 """REP 105: the robot's own frame."""
 MOST_GAP_S = 0.5
-_LISTED = 12
+_MOST_LISTED = 12
 _AROUND_NS = 50_000_000
 _FORWARD_LEFT_UP = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """Right, forward, up of what REP 103 counts forward, left, up."""
@@ -61,7 +62,7 @@ class PlacedBag:
 def placed(
     contents: BagContents, *, base: str | None = None, from_transforms: bool = False, most_gap_s: float = MOST_GAP_S
 ) -> PlacedBag:
-    """``base``: the robot's frame, of which the poses are; None: as they say it, else ``base_link``.
+    """``base``: the robot's frame; None: that of which the poses are, else ``base_link``.
 
     ``from_transforms``: poses are the transforms' own, from the root of the tree. Raises RecordingError where nothing
     can be placed: which transform is missing, and between which times.
@@ -99,6 +100,7 @@ class _Robot:
             world = tree.ancestors(base)[-1]
             way = tree.way(world, base)
             assert way is not None
+            _check_moves(way, world, base, tree.names)
             return cls(world, base, way.at, way.rising, lambda frame: tree.way(base, frame))
         poses = contents.poses
         if not len(poses):
@@ -108,8 +110,16 @@ class _Robot:
             raise RecordingError("The poses of that topic are of several frames.", advice="Choose another topic.")
         own = contents.names[child] if child >= 0 else None
         chosen = base or own or _known_base(None, tree.names)
-        track = track_of(poses, contents.names[parent], chosen)
-        return cls(track.parent, chosen, track.at, (track,), lambda frame: tree.way(chosen, frame))
+        track = track_of(poses, contents.names[parent], own or chosen)
+        if own is None or own == chosen:
+            return cls(track.parent, chosen, track.at, (track,), lambda frame: tree.way(chosen, frame))
+        own_from_chosen = tree.way(own, chosen)
+        if own_from_chosen is None:
+            what = f"The poses are of the frame {own}, and no transform leads from there to {chosen}."
+            raise RecordingError(what, advice=f"Leave --frame out; {_listed(tree.names)}.")
+        tracks = (track, *own_from_chosen.rising, *own_from_chosen.falling)
+        pose_at = partial(_chosen_pose, track, own_from_chosen)
+        return cls(track.parent, chosen, pose_at, tracks, lambda frame: tree.way(chosen, frame))
 
     def first(self, stamps_ns: Any, most_gap_ns: int) -> tuple[int, F64]:
         """When and where the first pose was."""
@@ -136,9 +146,31 @@ def _known_base(base: str | None, names: Sequence[str]) -> str:
     wanted = base or BASE_LINK
     if wanted in names:
         return wanted
-    listed = ", ".join(names[:_LISTED]) or "none"
     what = f"No transform tells of the robot's frame {wanted}."
-    raise RecordingError(what, advice=f"Give its name with --frame; frames of the bag: {listed}.")
+    raise RecordingError(what, advice=f"Give its name with --frame; {_listed(names)}.")
+
+
+def _listed(names: Sequence[str]) -> str:
+    return f"frames of the bag: {', '.join(names[:_MOST_LISTED]) or 'none'}"
+
+
+def _check_moves(way: Way, world: str, base: str, names: Sequence[str]) -> None:
+    """Where each transform above the robot is static, or there is none, every cloud would be seen from one place."""
+    if any(not track.is_static for track in way.rising):
+        return
+    why = f"all transforms from {base} to {world} are static" if way.rising else f"no transform leads from {base} on"
+    what = f"Nothing tells where the robot was: {why}."
+    raise RecordingError(
+        what, advice=f"Give a topic of poses with --pose, or the robot's frame with --frame; {_listed(names)}."
+    )
+
+
+def _chosen_pose(track: Track, own_from_chosen: Way, t_ns: int, most_gap_ns: int) -> Transform | Gap:
+    """Of the frame that was chosen, by the poses of another one."""
+    pose, moved = track.at(t_ns, most_gap_ns), own_from_chosen.at(t_ns, most_gap_ns)
+    if isinstance(pose, Gap) or isinstance(moved, Gap):
+        return pose if isinstance(pose, Gap) else moved
+    return pose @ moved
 
 
 def _clouds(
