@@ -100,6 +100,7 @@ def test_a_flight_is_exported_and_listed(tmp_path: Path) -> None:
     run = hedgehop("export", flight, "--ros2", out, "--json")
     assert run.code == 0
     assert run.json["messages"]["/fix"] > 10
+    assert run.json["faults"] == []
     listed = {row["topic"]: row["messages"] for row in hedgehop("bag", out, "--json").json["topics"]}
     assert listed == run.json["messages"]
     again = hedgehop("export", flight, "--ros2", out)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,8 @@ from telemetry.recording.mcap_files.reader import open_recording
 from telemetry.recording.mcap_files.writer import RecordingWriter
 from telemetry.recording.ros.bag import bag_kind, list_bag
 from telemetry.recording.ros.bag_flight import BagAsked, write_bag_flight
-from telemetry.recording.ros.ros2_export import export_ros2
+from telemetry.recording.ros.ros2_export import Ros2Export, export_ros2
+from telemetry.recording.ros.ros2_writer import Ros2Writer
 from telemetry.topics.messages import Topic
 from telemetry.topics.vehicle import VehicleState
 from tests.telemetry import perception_flights as flights
@@ -47,9 +49,9 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def bag(recording: Path) -> Path:
     out = recording.with_name("ros2.mcap")
-    assert export_ros2(recording, out) == {
-        "/camera/points": 2, "/fix": 80, "/odom": 80, "/radar/points": 40, "/tf": 80,
-    }  # fmt: skip
+    messages = {"/camera/points": 2, "/fix": 80, "/odom": 80, "/radar/points": 40, "/tf": 80}
+    assert export_ros2(recording, out) == Ros2Export(messages, ())
+    assert not list(out.parent.glob(".tmp-*"))
     return out
 
 
@@ -123,3 +125,26 @@ def test_a_recording_without_a_flight_is_refused(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="nothing to export"):
         export_ros2(tmp_path / "a.mcap", tmp_path / "b.mcap")
     assert not (tmp_path / "b.mcap").exists()
+
+
+def test_what_is_damaged_in_the_recording_is_said(recording: Path, tmp_path: Path) -> None:
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(recording.read_bytes()[:-4000])
+    made = export_ros2(cut, tmp_path / "ros2.mcap")
+    assert made.messages["/odom"] > 0
+    assert any("not finished" in fault for fault in made.faults)
+
+
+def test_half_a_bag_is_none(recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    out, write = tmp_path / "ros2.mcap", Ros2Writer.cloud
+
+    def full(*given: Any, **others: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Ros2Writer, "cloud", full)
+    with pytest.raises(OSError, match="No space left"):
+        export_ros2(recording, out)
+    assert list(tmp_path.iterdir()) == []
+    monkeypatch.setattr(Ros2Writer, "cloud", write)
+    assert export_ros2(recording, out).messages["/radar/points"] == 40
+    assert list(tmp_path.iterdir()) == [out]

@@ -10,7 +10,7 @@ from typer import Argument, Option
 from server.cli.shared import options as o
 from server.cli.shared.command import command
 from server.cli.shared.files_in_out import check_directory
-from server.cli.shared.output import answer
+from server.cli.shared.output import answer, say_notes
 from server.errors import StorageError
 from telemetry.recording.ros.ros2_export import export_ros2
 
@@ -28,9 +28,10 @@ def export(
     if ros2.exists():
         raise StorageError("There is such a file already.", where=str(ros2), advice="Move it, or give another name.")
     check_directory(ros2.parent)
-    counts = export_ros2(recording, ros2)
+    made = export_ros2(recording, ros2)
+    say_notes(*made.faults)
     lines = [
         f"{ros2.name}: a ROS 2 bag",
-        *(f"  {topic}: {count:,} messages" for topic, count in sorted(counts.items())),
+        *(f"  {topic}: {count:,} messages" for topic, count in made.messages.items()),
     ]
-    answer({"file": str(ros2), "messages": counts}, lines, as_json=as_json)
+    answer({"file": str(ros2), "messages": made.messages, "faults": list(made.faults)}, lines, as_json=as_json)

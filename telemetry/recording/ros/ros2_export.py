@@ -8,6 +8,7 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from operator import itemgetter
 from pathlib import Path
 
@@ -32,8 +33,16 @@ _Write = Callable[[Ros2Writer], None]
 _Entry = tuple[int, _Write]
 
 
-def export_ros2(path: Path, out: Path) -> dict[str, int]:
-    """Messages written, by topic. Raises RecordingError for what is no recording, or holds nothing of all this."""
+@dataclass(frozen=True, slots=True)
+class Ros2Export:
+    messages: dict[str, int]
+    """Written, by topic."""
+    faults: tuple[str, ...]
+    """Of the recording: what was lost is not in the bag."""
+
+
+def export_ros2(path: Path, out: Path) -> Ros2Export:
+    """Raises RecordingError for what is no recording, or holds nothing of all this; then there is no ``out``."""
     with open_recording(path) as recording:
         states = [e.message for e in recording.entries((Topic.VEHICLE,)) if isinstance(e.message, VehicleState)]
         shift_s = recording.mono_minus_utc_s
@@ -46,7 +55,7 @@ def export_ros2(path: Path, out: Path) -> dict[str, int]:
         with Ros2Writer(out, library=_LIBRARY) as writer:
             for _, write in (first, *entries):
                 write(writer)
-    return dict(sorted(writer.counts.items()))
+        return Ros2Export(dict(sorted(writer.counts.items())), tuple(recording.faults))
 
 
 def _poses(states: list[VehicleState], shift_s: float) -> Iterator[_Entry]:

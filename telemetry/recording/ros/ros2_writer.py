@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from secrets import token_hex
 from types import TracebackType
 from typing import Any
 
@@ -22,11 +23,12 @@ _FLOAT32 = 7
 
 
 class Ros2Writer:
-    """One file; messages in any order."""
+    """One file; messages in any order. It is written aside, and only there when it is whole."""
 
     def __init__(self, path: Path, *, library: str) -> None:
         self._store: Any = get_typestore(Stores.ROS2_HUMBLE)
-        self._file = path.open("wb")
+        self._path, self._aside = path, path.with_name(f".tmp-{path.name}-{token_hex(8)}")
+        self._file = self._aside.open("wb")
         self._writer = Writer(self._file)
         self._writer.start(profile="ros2", library=library)
         self._channels: dict[str, int] = {}
@@ -39,9 +41,13 @@ class Ros2Writer:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         try:
-            self._writer.finish()
+            with self._file:
+                if kind is None:
+                    self._writer.finish()
+            if kind is None:
+                self._aside.replace(self._path)
         finally:
-            self._file.close()
+            self._aside.unlink(missing_ok=True)
 
     def odometry(self, topic: str, stamp_ns: int, parent: str, child: str, xyz_m: F64, q_wxyz: F64) -> None:
         """Where ``child`` is in ``parent``; its velocities are left at 0, with a variance of -1: unknown."""
