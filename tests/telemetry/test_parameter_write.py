@@ -88,6 +88,24 @@ def test_fifty_of_fifty_writings_are_whole_over_a_lossy_link(
         assert made.now_s < 60.0, seed
 
 
+class Keeps(ArduPilotParameters):
+    """Takes nothing, and echoes what it holds."""
+
+    def on_set(self, message: Any) -> list[Any]:
+        return [self.value(message.param_id, 65535)]
+
+
+@pytest.mark.parametrize("round_trip_s", [0.3, 1.0, 1.6, 2.0, 4.0])
+def test_late_answers_of_a_slow_link_are_not_what_the_vehicle_holds_now(round_trip_s: float) -> None:
+    slow = Faults(latency_s=round_trip_s / 2)
+    vehicle = ArduPilotParameters({"A": (1.0, 9), "B": (5.0, 6)})
+    made = run(vehicle, {"A": 2.0, "B": 6.4}, slow)
+    assert [(w.outcome, w.before, w.after) for w in made.result] == [("set", 1.0, 2.0), ("refused", 5.0, 5.0)]
+    assert vehicle.table == {"A": (2.0, 9), "B": (5.0, 6)}
+    (kept,) = run(Keeps({"A": (1.0, 9)}), {"A": 2.0}, slow).result
+    assert (kept.outcome, kept.after) == ("kept", 1.0)
+
+
 @pytest.mark.fact("P26")
 def test_integers_of_px4_go_bytewise() -> None:
     vehicle = Px4Parameters({"NAV_DLL_ACT": (0.0, 6), "BIG": (0.0, 6), "NEG": (0.0, 6)})

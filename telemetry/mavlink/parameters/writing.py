@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import SilentError
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
-from telemetry.mavlink.conversation import Endpoints
+from telemetry.mavlink.conversation import FACTOR, MARGIN_S, Endpoints
 from telemetry.mavlink.parameters.values import parameter_of, same_value, why_not, wire_value
 from telemetry.mavlink.texts import VehicleWords
 from telemetry.topics.parameters import (
@@ -57,6 +57,9 @@ class ParameterWrite:
         self._changes, self._target, self._bytewise, self._even_armed = changes, target, bytewise, even_armed
         self._written: list[ParameterWritten] = []
         self._words, self._heard_s, self._armed, self._over = VehicleWords(), 0.0, False, False
+        self._late_s = self._late_until_s = 0.0
+        """How long after a question its answer may come, if that is longer than until it is asked again; and so, until
+        when the old value may be an answer to a question from before it was set."""
 
     def start(self, now_s: float) -> list[Action]:
         self._heard_s = now_s
@@ -114,7 +117,9 @@ class ParameterWrite:
         return [done, *self._enter(_Phase.BEFORE, now_s)]
 
     def _enter(self, phase: _Phase, now_s: float) -> list[Action]:
-        self._phase, self._tries = phase, 0
+        if phase is _Phase.SETTING:
+            self._late_until_s = self._asked_s + self._late_s
+        self._phase, self._tries, self._entered_s = phase, 0, now_s
         return self._ask(now_s)
 
     def _ask(self, now_s: float) -> list[Action]:
@@ -128,12 +133,23 @@ class ParameterWrite:
     def _on_value(self, parameter: Parameter, now_s: float) -> list[Action]:
         if self._phase is _Phase.BEFORE:
             return self._on_before(parameter, now_s)
+        if self._may_be_late(parameter, now_s):
+            return []
         if self._phase is _Phase.SETTING:
             return self._enter(_Phase.AFTER, now_s)
         return self._on_after(parameter, now_s)
 
+    def _may_be_late(self, parameter: Parameter, now_s: float) -> bool:
+        """The old value, while an answer to what was asked before it was set may still be on its way."""
+        old = None if self._before is None else self._before.value
+        if now_s >= self._late_until_s or parameter.value is None or old is None:
+            return False
+        return self._same(parameter.value, old)
+
     def _on_before(self, parameter: Parameter, now_s: float) -> list[Action]:
         self._before, asked = parameter, self._change.value
+        # The question that is answered is the first one at the earliest; asked once, nothing is late.
+        self._late_s = FACTOR * (now_s - self._entered_s) + MARGIN_S if self._tries > 1 else 0.0
         if reason := why_not(asked, parameter.kind):
             return self._settle("refused", parameter.value, now_s, f"{reason} Nothing was sent.")
         if parameter.value is not None and self._same(parameter.value, asked):
