@@ -4,6 +4,7 @@ home of the take-off, and what counts its heights from home flies higher or lowe
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mapping.geometry.frames import offset_m
@@ -29,6 +30,17 @@ class HomePlace:
 def home_of(state: VehicleState) -> HomePlace | None:
     lat_deg, lon_deg, alt_m = state.home_lat_deg, state.home_lon_deg, state.home_alt_amsl_m
     return None if lat_deg is None or lon_deg is None or alt_m is None else HomePlace(lat_deg, lon_deg, alt_m)
+
+
+def home_of_takeoff(states: Sequence[VehicleState]) -> HomePlace | None:
+    """Home as the vehicle told it first in the air: before that it may be the one of an earlier flight.
+
+    None where the states of the flight begin in the air already: it may have been moved before.
+    """
+    if not states or is_in_the_air(states[0]):
+        return None
+    flown = (state for state in states if is_in_the_air(state))
+    return next((home for state in flown if (home := home_of(state)) is not None), None)
 
 
 class HomeWatch:

@@ -26,9 +26,8 @@ from planning.terrain.dsm import Dsm
 from planning.terrain.holes import fill_holes
 from telemetry.errors import NotAllowedError
 from telemetry.flight.certified_way import Flown, demanded, judged_way
-from telemetry.flight.home_watch import HomePlace, home_of, moved_words
 from telemetry.flight.preflight import checks
-from telemetry.flight.preflight.preflight import LARGEST_SHIFT_M, actual_home
+from telemetry.flight.preflight.preflight import actual_home
 from telemetry.flight.preflight.rereference import rereference
 from telemetry.mavlink.items import mission_from_onboard
 from telemetry.topics.onboard_lists import OnboardMission
@@ -70,21 +69,6 @@ class TakenUp:
     certificate: Certificate
     """Of way and rest."""
     battery: checks.Row
-
-
-def check_home_height(ground: Dsm, took_off: HomePlace | None, state: VehicleState) -> None:
-    """Whether home, where it was moved in flight, lies on the ground as the home of the take-off did: all heights are
-    counted from it. Raises NotAllowedError."""
-    now = home_of(state)
-    if took_off is None or now is None or moved_words(took_off, now) is None:
-        return
-    xy_m = ground.xy_from_lat_lon(np.array([[home.lat_deg, home.lon_deg] for home in (took_off, now)]))
-    before_m, now_m = ground.elevation_at(xy_m).tolist()
-    off_m = (now.alt_amsl_m - took_off.alt_amsl_m) - (now_m - before_m)
-    if not abs(off_m) <= LARGEST_SHIFT_M:
-        far = f"{abs(off_m):.1f} m {'above' if off_m > 0 else 'below'} the ground" if np.isfinite(off_m) else "off"
-        what = f"Home was moved in flight to a height that is {far} of the surface model there."
-        raise NotAllowedError(what, where="home", advice="Set home on known ground, or back to where it was.")
 
 
 def taken_up(

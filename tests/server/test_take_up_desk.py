@@ -77,6 +77,7 @@ async def flown(made: Made, tmp_path: Path, lanes: tuple[Lane, Lane], **more: An
     await bench.ready()
     bench.vehicle.told.clear()
     bench.live.state = hovering(made, **more)
+    bench.live.track.states = [made.standing(), bench.live.state]
     bench.watch.mirrors = {name: SimpleNamespace(origin=None) for name in ("radar", "vision", "ranges")}
     return bench
 
@@ -247,7 +248,6 @@ def test_a_home_that_was_moved_off_the_ground_is_not_counted_from(
 ) -> None:
     async def scenario() -> None:
         bench = await flown(made, tmp_path, lanes)
-        bench.live.track.states = [bench.live.state]
         there = made.standing(east_m=6.0)
         assert there.home_alt_amsl_m is not None
         bench.live.state = with_home(bench.live.state, there, there.home_alt_amsl_m + over_ground_m)
@@ -268,7 +268,6 @@ def test_a_home_that_was_moved_to_where_something_stands_is_not_certified(
 ) -> None:
     async def scenario() -> None:
         bench = await flown(made, tmp_path, lanes)
-        bench.live.track.states = [bench.live.state]
         there = beside_something(made)
         assert there.home_alt_amsl_m is not None
         bench.live.state = with_home(bench.live.state, there, there.home_alt_amsl_m)

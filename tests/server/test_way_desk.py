@@ -75,6 +75,7 @@ class Bench:
         now_s = time.monotonic()
         flies = {"armed": True, "landed": "in_air", "alt_rel_home_m": up_m} if up_m else {}
         self.live.state = replace(standing, position_t_mono_s=now_s, gnss_t_mono_s=now_s, **flies)
+        self.live.track.states = [standing, self.live.state]
 
     def beside(self, east_m: float, north_m: float) -> PlaceDoc:
         there = self.made.standing(east_m=east_m, north_m=north_m)
@@ -309,6 +310,26 @@ def test_what_cannot_be_judged_is_said_with_what_to_do(made: Made, lane: Lane, r
         without.live.state = None
         with pytest.raises(NoVehicleError):
             await without.judged(action="height")
+
+    runner.run(scenario())
+
+
+def test_no_way_is_judged_from_a_home_that_lies_off_the_ground_or_may_do_so(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        state = bench.live.state
+        assert state is not None
+        assert state.home_alt_amsl_m is not None
+        bench.live.state = replace(state, home_alt_amsl_m=state.home_alt_amsl_m - 8.0)
+        with pytest.raises(NotAllowedError, match=r"moved in flight to a height that is 8\.0 m below the ground"):
+            await bench.judged(action="height", height_m=20.0)
+        bench.live.state = replace(state, gnss_fix="3d")
+        bench.live.track.states = [state]
+        with pytest.raises(NotAllowedError, match="Home of the take-off was not heard here"):
+            await bench.judged(action="height", height_m=20.0)
+        assert bench.desk.state == GuidedState()
 
     runner.run(scenario())
 

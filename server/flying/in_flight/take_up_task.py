@@ -146,7 +146,8 @@ def _flown(asked: Asked, aboard: PlacesOnboard) -> Flown:
 
 
 def _over(asked: Asked) -> Over:
-    from telemetry.flight.taking_up import Over, check_home_height
+    from telemetry.flight.home_height import check_home_height
+    from telemetry.flight.taking_up import Over
 
     ground = load_terrain(asked.directory)
     check_home_height(ground, asked.took_off, asked.state)

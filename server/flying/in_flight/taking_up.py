@@ -27,7 +27,7 @@ from server.workspace import Workspace
 from telemetry.bus.link_client import LinkClient
 from telemetry.errors import NotAllowedError, NoVehicleError, SilentError, TelemetryError
 from telemetry.flight.guided.beginning import why_moves
-from telemetry.flight.home_watch import HomePlace, home_of
+from telemetry.flight.home_watch import home_of_takeoff
 from telemetry.flight.preflight.parameters import NAMES
 from telemetry.mavlink.autopilot_orders import HOLD_MODES
 from telemetry.mavlink.believing import is_in_the_air
@@ -105,7 +105,7 @@ class TakingUp:
             await self._link.call(ReadParameters(NAMES["px4" if state.autopilot == "px4" else "ardupilot"])),
             await self._places(operator),
             await asyncio.to_thread(seen_maps, self._watch),
-            self._took_off(),
+            home_of_takeoff(self._live.track.states),
         )
         asked = replace(asked, state=self._state(), now_mono_s=time.monotonic())
         made = await self._workspace.plan_lane.call(make_take_up, asked)
@@ -145,11 +145,6 @@ class TakingUp:
             f"The vehicle holds. On board are {len(found.items)} items that are not the mission before, and they are"
             " not certified: Resume is refused. Try again, return home, or land."
         )
-
-    def _took_off(self) -> HomePlace | None:
-        """Home as the vehicle told it first in the air: before that it may be the one of an earlier flight."""
-        flown = (state for state in self._live.track.states if is_in_the_air(state))
-        return next((home for state in flown if (home := home_of(state)) is not None), None)
 
     async def _places(self, operator: Operator) -> PlacesOnboard:
         try:

@@ -34,6 +34,7 @@ from telemetry.bus.link_client import LinkClient
 from telemetry.errors import NoVehicleError
 from telemetry.flight.certified_way import way_notes, way_request
 from telemetry.flight.guided.beginning import why_moves
+from telemetry.flight.home_watch import home_of_takeoff
 from telemetry.flight.preflight.parameters import NAMES
 from telemetry.topics.messages import FlightStatus
 from telemetry.topics.onboard_lists import PlacesOnboard
@@ -171,6 +172,7 @@ class WayDesk:
             PlacesOnboard(fence, rally),
             maps,
             flown_places(self._live.track.states),
+            home_of_takeoff(self._live.track.states),
         )
         return await self._lane.call(judge_way, asked)
 

@@ -12,6 +12,8 @@ from planning.guided.guided_model import Back, GoTo, GuidedWay, Look, Orbit, Ral
 from server.scene.mirror import Voxels
 from server.schemas import PlanDoc, WayBody
 from server.work.jobs import Progress
+from telemetry.flight.home_watch import HomePlace
+from telemetry.mavlink.believing import is_in_the_air
 from telemetry.topics.onboard_lists import PlacesOnboard
 from telemetry.topics.vehicle import VehicleState
 
@@ -38,6 +40,8 @@ class WayAsked:
     """What sensors have seen in this flight."""
     flown: tuple[tuple[float, float, float], ...]
     """(lat_deg, lon_deg, alt_rel_home_m) since the take-off."""
+    took_off: HomePlace | None
+    """The home that the flight began with; None: not known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +61,7 @@ def judge_way(asked: WayAsked, *, report: Progress) -> WayJudged:
     from server.library.fences import fence_from_doc
     from server.library.terrains import load_terrain
     from telemetry.flight.certified_way import Flown, judged_way, nearest_rally, part_for
+    from telemetry.flight.home_height import check_home_height
     from telemetry.mavlink.items import mission_items
 
     report("Judging the way", None)
@@ -70,6 +75,8 @@ def judge_way(asked: WayAsked, *, report: Progress) -> WayJudged:
         wish = replace(wish, point=nearest_rally(rally, asked.state))
     speed_m_s = asked.body.speed_m_s or demands.profile.mean_speed_m_s
     ground = load_terrain(asked.terrain)
+    if is_in_the_air(asked.state):
+        check_home_height(ground, asked.took_off, asked.state)
     seen = with_seen(ground, asked.terrain, asked.document.seen_id, asked.maps, asked.state)
     way = judged_way(
         part_for(ground, asked.state, wish, rally),

@@ -1,0 +1,48 @@
+"""Whether heights still count from the ground: home that was moved in flight may lie above or below it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from planning.terrain.dsm import SurfaceModel
+from planning.terrain.vertical_datum import is_amsl
+from telemetry.errors import NotAllowedError
+from telemetry.flight.home_watch import HomePlace, home_of, moved_words
+from telemetry.flight.preflight.preflight import LARGEST_SHIFT_M
+from telemetry.topics.vehicle import VehicleState
+
+
+def check_home_height(ground: SurfaceModel, took_off: HomePlace | None, state: VehicleState) -> None:
+    """Of a vehicle in the air, whose home is taken to lie on the model's ground as that of its take-off did.
+
+    ``took_off`` None: it is not known. Raises NotAllowedError.
+    """
+    now = home_of(state)
+    if now is None:
+        raise NotAllowedError("The vehicle does not tell how high its home is.", where="home", advice="Wait for it.")
+    if took_off is None:
+        if not abs(_by_its_receiver_m(ground, now, state)) <= LARGEST_SHIFT_M:
+            what = "Home of the take-off was not heard here: whether its height is the ground's now is not known."
+            raise NotAllowedError(what, where="home", advice="Return home or land, then start from here.")
+        return
+    if moved_words(took_off, now) is None:
+        return
+    before_m, now_m = _ground_m(ground, took_off), _ground_m(ground, now)
+    off_m = (now.alt_amsl_m - took_off.alt_amsl_m) - (now_m - before_m)
+    if not abs(off_m) <= LARGEST_SHIFT_M:
+        far = f"{abs(off_m):.1f} m {'above' if off_m > 0 else 'below'} the ground" if np.isfinite(off_m) else "off"
+        what = f"Home was moved in flight to a height that is {far} of the surface model there."
+        raise NotAllowedError(what, where="home", advice="Set home on known ground, or back to where it was.")
+
+
+def _by_its_receiver_m(ground: SurfaceModel, home: HomePlace, state: VehicleState) -> float:
+    """Home above the ground, NaN where that needs what is not there: heights above the sea, told to centimetres."""
+    if state.gnss_fix != "rtk_fixed" or not is_amsl(ground.vertical_datum):
+        return math.nan
+    return home.alt_amsl_m - _ground_m(ground, home)
+
+
+def _ground_m(ground: SurfaceModel, home: HomePlace) -> float:
+    return float(ground.elevation_at(ground.xy_from_lat_lon(np.array([[home.lat_deg, home.lon_deg]])))[0])
