@@ -187,6 +187,7 @@ class Answering:
         words = f"upload {request.kind} of {len(request.items)} items" if request.items else f"clear {request.kind}"
         await self._record(request, f"{words}{_HOLDING[request.while_holding]}")
         _refuse_in_mission(session.pilot, request)  # a start may have come while the disk was waited for
+        session.pilot.replaces(places=True)
         return await session.transfers.upload_places(request)
 
     async def _take_up(self, request: requests.TakeUp) -> None:

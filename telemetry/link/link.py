@@ -18,6 +18,7 @@ from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.audit import AUTOPILOT, Audit, CommandLog
 from telemetry.link.heartbeat import Grace, Heartbeat, heartbeat
 from telemetry.link.line import Line
+from telemetry.link.onboard import Started
 from telemetry.link.peers import Expected, Peers, Source, is_same_vehicle
 from telemetry.link.publishing import StatePublisher, StatusTeller
 from telemetry.link.session import Around, Session, Settings
@@ -120,8 +121,10 @@ class Link:
         self.session = Session(candidate, line, self._around, self._ranges, self._settings)
         self.session.begin()
         before, self._expected = self._expected, None
-        if before is not None and before.avoid_by is not None and is_same_vehicle(before.vehicle, candidate):
-            self.session.avoid_again(before.avoid_by, was_in_flight=before.may_fly)
+        if before is not None and is_same_vehicle(before.vehicle, candidate):
+            self.session.pilot.inherit(before.started)
+            if before.avoid_by is not None:
+                self.session.avoid_again(before.avoid_by, was_in_flight=before.may_fly)
 
     def _go_on_from(self, session: Session, candidate: Candidate) -> None:
         """The vehicle that was lost is heard from elsewhere: what it flies, and what it was asked, stays."""
@@ -162,10 +165,15 @@ class Link:
         state = self.session.vehicle.state
         return state.heartbeat_t_mono_s is None or state.armed
 
-    def expect(
-        self, vehicle: Candidate, *, may_fly: bool, avoid_by: AvoidBy | None, ways: tuple[Candidate, ...] = ()
-    ) -> None:
-        self._expected = Expected(vehicle, time.monotonic(), may_fly, avoid_by, ways)
+    @property
+    def started(self) -> Started:
+        """The mission of the flight that is under way; of the one before this node's start until it is heard again."""
+        if self.session is None:
+            return Started() if self._expected is None else self._expected.started
+        return self.session.pilot.started
+
+    def expect(self, vehicle: Expected) -> None:
+        self._expected = vehicle
 
     def give_up_expected(self) -> None:
         if self._expected is not None:

@@ -20,8 +20,8 @@ from telemetry.errors import MissionUnknownError, NotAllowedError, RefusedError,
 from telemetry.flight.guided.beginning import why_moves, why_not_from
 from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_from
 from telemetry.link.adopted import AdoptedVehicle
-from telemetry.link.onboard import OnBoard
-from telemetry.mavlink.autopilot_orders import HOLD_MODES
+from telemetry.link.onboard import OnBoard, Started
+from telemetry.mavlink.autopilot_orders import HOLD_MODES, MISSION_MODES
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import sequence_of
 from telemetry.topics.messages import GuidedTarget
@@ -46,6 +46,8 @@ GUIDED = "GUIDED"
 FIRST = 1
 UNKNOWN_MISSION = "unknown"
 """No digest is this."""
+OTHER_PLACES = "other places"
+"""No digest is this: the mission was started with another fence, or other rally points."""
 FOREIGN_MISSION = (
     "The mission on board is not the one that was started any more: another ground station has written to it."
     " The vehicle holds. Return home or land."
@@ -170,6 +172,65 @@ def check_begins(request: TakeUp | FlyWay, state: VehicleState) -> None:
     """Raises NotAllowedError unless the vehicle holds still where what it is to fly was certified to begin."""
     if (refusal := why_not_from(request, state, time.monotonic())) is not None:
         raise refusal
+
+
+class UnderWay:
+    """The mission of the flight that is under way: ``started`` changes only by the calls below."""
+
+    def __init__(self, onboard: OnBoard) -> None:
+        self._onboard, self.started = onboard, Started()
+        self._is_inherited = self._known_foreign = False
+        """Of a link node before this one, and not held against what is on board yet. The alarm has been raised."""
+
+    def begin(self, digest: str | None, begins: TakeUp | None = None) -> None:
+        self.started, self._is_inherited = Started(digest, begins), False
+
+    def inherit(self, started: Started) -> None:
+        self.started, self._is_inherited = started, True
+
+    def replaces(self) -> None:
+        """What is on board is replaced: it is not flown before it is taken up."""
+        digest = self.started.digest or self._onboard.digest or UNKNOWN_MISSION
+        self.started = Started(digest, self.started.begins)
+
+    def replaces_places(self) -> None:
+        """Fence or rally points are: the mission on board was not certified with those that come."""
+        self.begin(OTHER_PLACES)
+
+    def on_state(self, state: VehicleState) -> None:
+        if _flies_mission(state) and self.started.begins is not None:
+            self.started = Started(self.started.digest)
+        if self._onboard.mission is not None:
+            self._is_inherited = False
+
+    @property
+    def must_be_read(self) -> bool:
+        """A link node before this one knew what was on board, and this one does not yet."""
+        return self._is_inherited and self._onboard.mission is None and self.started.digest is not None
+
+    def check_goes_on(self, state: VehicleState) -> None:
+        """Raises MissionUnknownError, or NotAllowedError elsewhere than where it begins."""
+        if self.started.digest == OTHER_PLACES:
+            what = "The mission on board is not certified with the fence and rally points that were sent since."
+            raise NotAllowedError(what, advice="Take the plan up again, return home, or land.")
+        if self.started.digest is not None:
+            check_same_mission(self._onboard, self.started.digest)
+        if self.started.begins is not None:
+            check_begins(self.started.begins, state)
+
+    def turns_foreign(self, state: VehicleState) -> bool:
+        """The vehicle flies by another mission than the one that was started: true once."""
+        digest = self.started.digest
+        if digest is None or self._is_inherited or self._onboard.digest == digest:
+            self._known_foreign = False
+            return False
+        is_first = _flies_mission(state) and not self._known_foreign
+        self._known_foreign = self._known_foreign or is_first
+        return is_first
+
+
+def _flies_mission(state: VehicleState) -> bool:
+    return state.armed and state.mode == MISSION_MODES.get(state.autopilot, "AUTO")
 
 
 async def first_item_next(vehicle: AdoptedVehicle) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 from telemetry.flight.avoidance.fence_aboard import FenceAboard
 from telemetry.mavlink.actions import Message
 from telemetry.topics.onboard_lists import OnboardMission
+from telemetry.topics.requests import TakeUp
 from telemetry.topics.vehicle import VehicleState
 
 SETTLE_S = 2.0
@@ -15,6 +17,16 @@ _OF_A_TRANSFER = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")
 _WRITES = ("MISSION_COUNT", "MISSION_WRITE_PARTIAL_LIST", "MISSION_CLEAR_ALL")
 """How a ground station begins to replace a mission."""
 PLAN_RECEIVED = "Flight plan received"
+
+
+@dataclass(frozen=True, slots=True)
+class Started:
+    """Which mission a flight goes on with, for this link node and the next."""
+
+    digest: str | None = None
+    """Of the mission that was started from here."""
+    begins: TakeUp | None = None
+    """Where a mission that was taken up in flight begins, until it is flown."""
 
 
 class OnBoard:

@@ -11,9 +11,10 @@ numbers is heard as "asked" until ``ways`` has compared its clock.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
+from telemetry.link.onboard import Started
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.connections import Peer
 from telemetry.mavlink.reduce import autopilot_name, is_vehicle_heartbeat
@@ -56,6 +57,7 @@ class Expected:
     """Avoidance was on when that node ended."""
     ways: tuple[Candidate, ...] = ()
     """Where it was heard last, one for each connection."""
+    started: Started = field(default_factory=Started)
     is_given_up: bool = False
     """It was not heard for so long that it counts as gone; it is still known when it does come back."""
 

@@ -15,9 +15,9 @@ from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.avoidance import Avoidance, remaining_after
 from telemetry.link.missions import (
     FOREIGN_MISSION,
-    UNKNOWN_MISSION,
     JoinMission,
     ReadMission,
+    UnderWay,
     check_begins,
     check_holds,
     check_may_start,
@@ -27,6 +27,7 @@ from telemetry.link.missions import (
     set_speeds,
     start_mission,
 )
+from telemetry.link.onboard import Started
 from telemetry.link.procedures import Accepted, Procedures, ReadParameters, Spawn, change_mode, guided_way
 from telemetry.mavlink.autopilot_orders import HOLD_MODES, MISSION_MODES
 from telemetry.mavlink.believing import is_in_the_air
@@ -66,12 +67,7 @@ class Pilot:
         """For which the way that is flown is certified; None: it is a mission's."""
         self._flown: OnboardMission | None = None
         """What was on board in the last flight."""
-        self._started_digest: str | None = None
-        """Of the mission that is under way, if it was started from here."""
-        self._begins: TakeUp | None = None
-        """Where a mission that was taken up in flight begins, until it is flown."""
-        self._known_foreign = False
-        """The alarm over another mission has been raised."""
+        self._under_way = UnderWay(vehicle.onboard)
 
     @property
     def script_flies(self) -> bool:
@@ -92,6 +88,15 @@ class Pilot:
         in_mission = state.mode == MISSION_MODES.get(state.autopilot, "AUTO")
         return self.flight.status.phase == "arming" or (state.armed and (in_mission or self.flight.is_under_way))
 
+    @property
+    def started(self) -> Started:
+        """For the link node after this one."""
+        return self._under_way.started
+
+    def inherit(self, started: Started) -> None:
+        """Of the link node before this one, whose flight goes on."""
+        self._under_way.inherit(started)
+
     def close(self) -> None:
         """The vehicle is given up: nothing more is sent."""
         self._end_current()
@@ -103,15 +108,14 @@ class Pilot:
         if state.heartbeat_t_mono_s is None:
             return  # it has just been adopted: nobody knows yet whether it is armed
         self.avoidance.on_tick()
+        self._under_way.on_state(state)
         if self.avoidance.is_engaged:
             self._follow_avoidance()
             return
         if self.script is not None:
             self._follow_script(self.script)
-        if self.flight.status.phase != "paused":
-            self._begins = None
         if not self.flight.is_under_way:
-            self._started_digest = None
+            self._under_way.begin(None)
         elif self.vehicle.onboard.mission is not None:
             self._flown = self.vehicle.onboard.mission
         joining = self.join is not None and self.join.is_active
@@ -119,10 +123,10 @@ class Pilot:
             self.flight.on_state(state, self.vehicle.onboard.mission, joining=joining)
         self._watch_mission(state)
 
-    def replaces(self) -> None:
-        """What is on board is replaced in flight: it is not flown before it is taken up."""
+    def replaces(self, *, places: bool = False) -> None:
+        """What is on board is replaced in flight; ``places``: its fence or rally points."""
         if self.flight.is_under_way:
-            self._started_digest = self._started_digest or self.vehicle.onboard.digest or UNKNOWN_MISSION
+            (self._under_way.replaces_places if places else self._under_way.replaces)()
 
     def uploaded(self, onboard: OnboardMission) -> None:
         """Where a flight broke off is a place of that flight's route; other heights are no other route."""
@@ -131,13 +135,7 @@ class Pilot:
 
     def _watch_mission(self, state: VehicleState) -> None:
         """A vehicle that flies by another mission than the one that was checked is stopped, once."""
-        started = self._started_digest
-        if started is None or self.vehicle.onboard.digest == started:
-            self._known_foreign = False
-            return
-        flies_it = state.armed and state.mode == MISSION_MODES.get(state.autopilot, "AUTO")
-        if flies_it and not self._known_foreign:
-            self._known_foreign = True
+        if self._under_way.turns_foreign(state):
             self._alarm(FOREIGN_MISSION)
             self._spawn(self._stop_foreign_mission())
 
@@ -193,7 +191,7 @@ class Pilot:
             raise NotAllowedError("The way has no targets, or is faster than certified.", advice="Ask for it again.")
         check_begins(request, self.vehicle.state)  # before anything ends that may hold the vehicle now
         self._end_current()
-        self._started_digest = None
+        self._under_way.begin(None)
         await self._fly_script(request)
 
     async def _fly_script(self, request: StartGuided | FlyWay) -> None:
@@ -269,12 +267,11 @@ class Pilot:
         if join is not None and not join.is_done:
             await self._procedures.take_over(join.go_on)
             return
-        if self._started_digest is not None:
-            check_same_mission(self.vehicle.onboard, self._started_digest)
-        if self._begins is None:
+        if self._under_way.must_be_read:
+            await self._read_mission()
+        self._under_way.check_goes_on(self.vehicle.state)
+        if self._under_way.started.begins is None:
             await self._check_goes_on()
-        else:
-            check_begins(self._begins, self.vehicle.state)
         await self._procedures.take_over(self._mission_mode)
 
     def check_holds(self) -> None:
@@ -289,7 +286,8 @@ class Pilot:
         self._end_current()
         self.script = self.join = None
         await first_item_next(self.vehicle)
-        self._started_digest, self._begins, onboard = request.digest, request, self.vehicle.onboard.mission
+        self._under_way.begin(request.digest, request)
+        onboard = self.vehicle.onboard.mission
         self.flight.replaced(len(onboard.items) if onboard else 0, time.time())
 
     async def return_home(self) -> None:
@@ -344,7 +342,7 @@ class Pilot:
     async def _start_auto(self, request: StartAuto, accepted: Accepted) -> None:
         vehicle, items = self.vehicle, self.vehicle.onboard.mission
         self.flight.begin(len(items.items) if items else 0, time.time(), first=request.from_item)
-        self._started_digest = request.digest
+        self._under_way.begin(request.digest)
         try:
             if self.join is not None:
                 await self.join.take_off()

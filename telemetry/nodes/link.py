@@ -22,10 +22,12 @@ from telemetry.link.answering import Answering, OperatorRight
 from telemetry.link.audit import AUDIT_FILE, open_audit
 from telemetry.link.keys import audit_key_file, signing_key_file
 from telemetry.link.link import Link, open_link
+from telemetry.link.onboard import Started
+from telemetry.link.peers import Expected
 from telemetry.link.signatures import KeyRing
 from telemetry.topics.messages import Candidate, FlightStatus, Topic
 from telemetry.topics.obstacles import AvoidBy, PerceptionSettings, PerceptionStatus
-from telemetry.topics.requests import LinkRequest, SetAvoidance
+from telemetry.topics.requests import LinkRequest, SetAvoidance, StartAuto, TakeUp
 from telemetry.topics.tracks import TracksStatus
 from telemetry.topics.traffic import TrafficSettings
 
@@ -57,6 +59,8 @@ class Memory:
     """Avoidance is on for the adopted vehicle, its operator has consented; None: off, or its pilot has taken over."""
     ways: tuple[Candidate, ...] = ()
     """Where the adopted vehicle was reached, one for each connection."""
+    started: Started = field(default_factory=Started)
+    """The mission of the flight that is under way."""
 
 
 def read_memory(file: Path) -> Memory:
@@ -86,7 +90,9 @@ class LinkNode:
         """What the node before this one had; then what this one was started with."""
         adopted = memory.adopted
         if adopted is not None:
-            self._link.expect(adopted, may_fly=memory.may_fly, avoid_by=memory.avoid_by, ways=memory.ways)
+            now_s = time.monotonic()
+            expected = Expected(adopted, now_s, memory.may_fly, memory.avoid_by, memory.ways, memory.started)
+            self._link.expect(expected)
         before = {place.address: place for place in (*([adopted] if adopted else []), *memory.ways)}
         for wanted in memory.connections:
             only = before.get(wanted.address)
@@ -144,7 +150,16 @@ class LinkNode:
             adopted, ways = self._memory.adopted, self._memory.ways
         elif adopted is None:
             self._link.give_up_expected()
-        memory = Memory(wanted, adopted, link.flight.status, self._right.highest, link.may_fly, link.avoids_by, ways)
+        memory = Memory(
+            wanted,
+            adopted,
+            link.flight.status,
+            self._right.highest,
+            link.may_fly,
+            link.avoids_by,
+            ways,
+            link.started,
+        )
         if memory != self._memory:
             self._memory = memory
             await asyncio.to_thread(write_memory, self._file, memory)
@@ -167,7 +182,7 @@ async def live(bus: Bus, context: NodeContext, *, links: list[str], grace_s: flo
 
             async def answer(request: LinkRequest) -> object:
                 answered = await answering.answer(request)
-                if isinstance(request, SetAvoidance):
+                if isinstance(request, SetAvoidance | StartAuto | TakeUp):
                     await node.remember()  # what protects the vehicle outlives this node from now on
                 return answered
 

@@ -7,6 +7,7 @@ import contextlib
 import os
 import pty
 import socket
+import time
 from collections.abc import AsyncIterator
 from typing import Any
 
@@ -20,6 +21,8 @@ from telemetry.errors import (
     RecordingFullError,
     RefusedError,
 )
+from telemetry.link.onboard import Started
+from telemetry.link.peers import Expected
 from telemetry.topics.messages import Candidate, CommandRecord, LinkStatus
 from telemetry.topics.obstacles import AvoidanceStatus
 from telemetry.topics.requests import (
@@ -103,7 +106,7 @@ def test_the_vehicle_of_the_node_before_gets_its_heartbeat_before_it_says_anythi
         vehicle, other = UdpVehicle(port), UdpVehicle(port)
         before = Candidate("old", f"udpin:127.0.0.1:{port}", f"127.0.0.1:{vehicle.port}", 1, 1, "ardupilot", 2)
         async with console() as bench:
-            bench.link.expect(before, may_fly=False, avoid_by=None)
+            bench.link.expect(Expected(before, time.monotonic(), False, None))
             await bench.handle(Connect(ME, before.address, True))
             await until(lambda: len(vehicle.of("HEARTBEAT")) >= 2)
             assert (vehicle.kinds(), other.heard, bench.status.adopted) == ({"HEARTBEAT"}, [], None)
@@ -123,7 +126,9 @@ def test_a_vehicle_that_may_fly_is_lost_from_sight_until_the_restarted_link_hear
         address = f"udpin:127.0.0.1:{free_port()}"
         before = Candidate("old", address, "127.0.0.1:9", 1, 1, "ardupilot", 2)
         async with console() as bench:
-            bench.link.expect(before, may_fly=True, avoid_by="sidestep")
+            started = Started("digest")
+            bench.link.expect(Expected(before, time.monotonic(), True, "sidestep", started=started))
+            assert bench.link.started == started
             await bench.handle(Connect(ME, address, True))
             await until(lambda: bench.status.state == "lost")
             # Whoever reads that it is off believes that somebody switched it off.

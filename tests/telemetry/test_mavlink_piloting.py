@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+from collections.abc import Awaitable
 from typing import Any
 
 import pytest
@@ -43,13 +44,17 @@ class Desk:
         self.bench = Bench()
         self.flight = FlightKeeper()
         self.tasks: set[asyncio.Task[None]] = set()
+        self.on_board: OnboardMission | None = None
+        """What a read-back finds; None: what was found before."""
 
         async def no_parameters(names: tuple[str, ...]) -> dict[str, float | None]:
             return dict.fromkeys(names)
 
         async def read_mission() -> OnboardMission:
-            mission = self.bench.vehicle.onboard.mission
+            onboard = self.bench.vehicle.onboard
+            mission = self.on_board or onboard.mission
             assert mission is not None
+            onboard.transfer_ends(mission, self.bench.now_s)
             return mission
 
         self.alarms: list[str] = []
@@ -70,6 +75,11 @@ class Desk:
     def modes(self) -> list[int]:
         """That were commanded, in order."""
         return [int(m.param2) for m in self.bench.wire.sent if getattr(m, "command", None) == SET_MODE]
+
+    async def within(self, seconds: float, doing: Awaitable[None]) -> None:
+        """Raises TimeoutError."""
+        async with asyncio.timeout(seconds):
+            await doing
 
     async def later(self, seconds: float) -> None:
         self.bench.now_s += seconds

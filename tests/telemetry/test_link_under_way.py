@@ -1,0 +1,129 @@
+"""The mission of the flight that is under way: what may be gone on with, here and by the next link node."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from telemetry.errors import MissionUnknownError, NotAllowedError
+from telemetry.link.missions import UnderWay
+from telemetry.link.onboard import OnBoard, Started
+from telemetry.nodes.link import Memory, read_memory, write_memory
+from telemetry.topics.messages import FlightStatus
+from telemetry.topics.onboard_lists import OnboardMission
+from telemetry.topics.requests import TakeUp
+from telemetry.topics.vehicle import VehicleState
+from tests.telemetry.bus_runs import run
+from tests.telemetry.frames import ARMED, AUTO, heartbeat
+from tests.telemetry.link_bench import ME
+from tests.telemetry.test_mavlink_piloting import BRAKE, MISSION, POSITION, desk, in_air
+
+TAKEN_UP = TakeUp(ME, "new", -37.0, 175.0, 10.0)
+FLYING = FlightStatus(way="auto", phase="paused", target=2, targets=3, since_utc_s=1.0)
+
+
+def holding(*, mode: str = "BRAKE", north_m: float = 0.0) -> VehicleState:
+    now_s = time.monotonic()
+    placed: dict[str, Any] = {"lat_deg": -37.0 + north_m / 111_000, "lon_deg": 175.0, "alt_rel_home_m": 10.0}
+    told: dict[str, Any] = {"armed": True, "landed": "in_air", "mode": mode, "position_t_mono_s": now_s}
+    return VehicleState(1, 1, autopilot="ardupilot", **placed, **told)
+
+
+def on_board(digest: str | None) -> OnBoard:
+    onboard = OnBoard()
+    if digest is not None:
+        onboard.transfer_ends(OnboardMission(MISSION, None, None, None, digest), 0.0)
+    return onboard
+
+
+def taken_up() -> UnderWay:
+    flight = UnderWay(on_board("new"))
+    flight.begin("new", TAKEN_UP)
+    return flight
+
+
+@pytest.mark.parametrize("mode", ["RTL", "LAND", "GUIDED"])
+def test_a_taken_up_mission_begins_where_it_was_certified_also_after_another_mode(mode: str) -> None:
+    flight = taken_up()
+    flight.on_state(holding(mode=mode))
+    flight.check_goes_on(holding())
+    with pytest.raises(NotAllowedError, match="from where the certified way begins"):
+        flight.check_goes_on(holding(north_m=80.0))
+
+
+def test_once_it_is_flown_it_is_gone_on_with_from_anywhere() -> None:
+    flight = taken_up()
+    flight.on_state(holding(mode="AUTO"))
+    flight.check_goes_on(holding(north_m=80.0))
+    assert flight.started == Started("new")
+
+
+def test_other_fences_and_rally_points_end_it_until_a_plan_is_taken_up() -> None:
+    flight = taken_up()
+    flight.replaces_places()
+    flight.replaces()
+    with pytest.raises(NotAllowedError, match="not certified with the fence and rally points"):
+        flight.check_goes_on(holding())
+    flight.begin("new", TAKEN_UP)
+    flight.check_goes_on(holding())
+
+
+def test_what_the_node_before_knew_is_held_against_what_is_read_and_stops_nobody_before() -> None:
+    onboard = on_board(None)
+    flight = UnderWay(onboard)
+    flight.inherit(Started("old"))
+    assert flight.must_be_read
+    assert not flight.turns_foreign(holding(mode="AUTO")), "nobody has looked yet"
+    with pytest.raises(MissionUnknownError, match="not known any more"):
+        flight.check_goes_on(holding())
+    onboard.transfer_ends(OnboardMission(MISSION, None, None, None, "mixed"), 0.0)
+    flight.on_state(holding())
+    assert not flight.must_be_read
+    with pytest.raises(MissionUnknownError, match="Another mission"):
+        flight.check_goes_on(holding())
+    assert flight.turns_foreign(holding(mode="AUTO"))
+    assert not flight.turns_foreign(holding(mode="AUTO")), "said once"
+
+
+@pytest.mark.parametrize("started", [Started(), Started("old"), Started("new", TAKEN_UP)])
+def test_it_is_written_down_for_the_next_node(tmp_path: Path, started: Started) -> None:
+    memory = Memory(flight=FLYING, started=started)
+    write_memory(tmp_path / "link.json", memory)
+    assert read_memory(tmp_path / "link.json") == memory
+
+
+@pytest.mark.parametrize(("digest", "may"), [("old", True), ("mixed", False)])
+def test_resume_after_a_restart_reads_what_is_on_board_and_flies_only_what_was_started(digest: str, may: bool) -> None:
+    async def whole() -> None:
+        async with desk(heartbeat(custom_mode=BRAKE, base_mode=ARMED), in_air(), POSITION) as it:
+            it.flight.take_up(FLYING)
+            it.pilot.inherit(Started("old"))
+            it.on_board = OnboardMission(MISSION, None, None, None, digest)
+            it.pilot.on_tick()
+            assert it.pilot.started == Started("old")
+            resuming = it.pilot.resume()
+            if may:
+                with pytest.raises(TimeoutError):
+                    await it.within(0.3, resuming)
+                assert it.modes() == [AUTO]
+            else:
+                with pytest.raises(MissionUnknownError, match="Another mission"):
+                    await resuming
+                assert it.modes() == []
+
+    run(whole)
+
+
+def test_the_end_of_the_flight_ends_it() -> None:
+    async def whole() -> None:
+        async with desk(heartbeat(custom_mode=BRAKE, base_mode=ARMED), in_air()) as it:
+            it.flight.take_up(replace(FLYING, phase="landed"))
+            it.pilot.inherit(Started("new", TAKEN_UP))
+            it.pilot.on_tick()
+            assert it.pilot.started == Started()
+
+    run(whole)
