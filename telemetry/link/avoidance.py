@@ -51,6 +51,11 @@ class Avoidance:
         return self._avoiding.is_engaged
 
     @property
+    def leads(self) -> bool:
+        """It is engaged, and not paused."""
+        return self.is_engaged and not self._avoiding.detour.is_paused
+
+    @property
     def avoids_by(self) -> AvoidBy | None:
         """None: it is off, or the pilot has taken over."""
         avoiding = self._avoiding

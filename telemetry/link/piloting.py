@@ -124,8 +124,10 @@ class Pilot:
         self._watch_mission(state)
 
     def replaces(self, *, places: bool = False) -> None:
-        """What is on board is replaced in flight; ``places``: its fence or rally points."""
+        """What is on board is replaced in flight; ``places``: its fence or rally points. A way past an obstacle that is
+        paused leads back to what is not there any more: it ends."""
         if self.flight.is_under_way:
+            self.avoidance.stop()
             (self._under_way.replaces_places if places else self._under_way.replaces)()
 
     def uploaded(self, onboard: OnboardMission) -> None:
@@ -277,7 +279,7 @@ class Pilot:
     def check_holds(self) -> None:
         """Raises NotAllowedError unless the vehicle holds in the air, and nothing here leads it."""
         leads = self.script_flies and self.script is not None and self.script.phase != "paused"
-        check_holds(self.vehicle.state, is_led=leads or self.avoidance.is_engaged or self._procedures.is_under_way)
+        check_holds(self.vehicle.state, is_led=leads or self.avoidance.leads or self._procedures.is_under_way)
 
     async def take_up(self, request: TakeUp) -> None:
         self.check_holds()

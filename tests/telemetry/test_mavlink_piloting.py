@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Awaitable
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,6 +17,7 @@ from telemetry.link.missions import check_same_mission, speeds_before
 from telemetry.link.onboard import OnBoard
 from telemetry.link.piloting import Pilot
 from telemetry.mavlink.flight_keeper import FlightKeeper
+from telemetry.topics.messages import FlightStatus
 from telemetry.topics.onboard_lists import Item, OnboardMission
 from telemetry.topics.requests import StartAuto
 from tests.telemetry.bus_runs import run
@@ -233,6 +235,25 @@ def test_a_mission_that_somebody_replaced_is_not_gone_on_with(found: str | None,
         onboard.transfer_ends(OnboardMission(MISSION, None, None, None, found), 0.0)
     with pytest.raises(MissionUnknownError, match=words):
         check_same_mission(onboard, "digest")
+
+
+@pytest.mark.parametrize("leads", [True, False])
+def test_a_mission_is_replaced_while_avoidance_is_paused_and_ends_it(leads: bool) -> None:
+    async def whole() -> None:
+        async with desk(heartbeat(custom_mode=BRAKE, base_mode=ARMED), in_air(), POSITION) as it:
+            it.flight.take_up(FlightStatus(way="auto", phase="paused", target=2, targets=3))
+            stopped: list[str] = []
+            avoidance: Any = SimpleNamespace(is_engaged=True, leads=leads, stop=lambda: stopped.append("stopped"))
+            it.pilot.avoidance = avoidance
+            if leads:
+                with pytest.raises(NotAllowedError, match="being led past something"):
+                    it.pilot.check_holds()
+                return
+            it.pilot.check_holds()
+            it.pilot.replaces()
+            assert stopped == ["stopped"]
+
+    run(whole)
 
 
 def test_the_last_speed_of_each_kind_counts() -> None:

@@ -73,6 +73,11 @@ class DetourState:
         return self.phase != "idle"
 
     @property
+    def is_paused(self) -> bool:
+        """It holds until an order comes."""
+        return self.phase == "holding" and self._paused
+
+    @property
     def is_manoeuvre(self) -> bool:
         return self.variant.is_manoeuvre
 
