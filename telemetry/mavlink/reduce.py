@@ -79,16 +79,17 @@ def reduce(state: VehicleState | None, message: Any, *, t_mono_s: float, t_utc_s
     return replace(state, t_utc_s=t_utc_s, **changes) if changes else state
 
 
-def _heartbeat(_: VehicleState, message: Any, t_mono_s: float) -> Changes:
+def _heartbeat(state: VehicleState, message: Any, t_mono_s: float) -> Changes:
     if not is_vehicle_heartbeat(message):
         return {}
-    autopilot = autopilot_name(message.autopilot)
-    return {
+    autopilot, armed = autopilot_name(message.autopilot), bool(message.base_mode & _ARMED)
+    begins: Changes = {"mission_reached": None} if armed and not state.armed else {}
+    return begins | {
         "autopilot": autopilot,
         "vehicle_type": message.type,
         "heartbeat_t_mono_s": t_mono_s,
         "mode": mode_name(autopilot, message.type, message.custom_mode),
-        "armed": bool(message.base_mode & _ARMED),
+        "armed": armed,
         "critical": message.system_status in _CRITICAL_STATES,
     }
 
@@ -221,9 +222,13 @@ def _home_position(_: VehicleState, message: Any, __: float) -> Changes:
     return {"home_lat_deg": lat_deg, "home_lon_deg": lon_deg, "home_alt_amsl_m": altitude_m}
 
 
-def _mission_current(_: VehicleState, message: Any, __: float) -> Changes:
-    items = {0: None, UINT16_MAX: 0}.get(message.total, message.total)
-    return {"mission_item": message.seq, "mission_items": items, "mission_id": mission_id(message)}
+def _mission_current(state: VehicleState, message: Any, _: float) -> Changes:
+    items, number = {0: None, UINT16_MAX: 0}.get(message.total, message.total), mission_id(message)
+    is_other = state.mission_item is not None and (items, number) != (state.mission_items, state.mission_id)
+    goes_back = state.landed == "in_air" and message.seq < (state.mission_reached or 0)
+    # What was reached of another mission, or lies ahead again, says nothing about this one.
+    forgets: Changes = {"mission_reached": None} if is_other or goes_back else {}
+    return forgets | {"mission_item": message.seq, "mission_items": items, "mission_id": number}
 
 
 def mission_id(message: Any) -> int | None:

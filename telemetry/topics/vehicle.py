@@ -91,6 +91,7 @@ class VehicleState:
     """Sequence number that the vehicle flies to, as the vehicle counts (ArduPilot: 0 is home)."""
     mission_items: int | None = None
     mission_reached: int | None = None
+    """Last in this flight and of this mission, if it does not lie ahead again."""
     """Last sequence number that the vehicle said it reached."""
     mission_id: int | None = None
     """MISSION_CURRENT.mission_id; None when unsupported or 0."""

@@ -270,6 +270,27 @@ def test_single_messages(message: Any, field: str, value: object) -> None:
     assert getattr(known(message), field) == value
 
 
+@pytest.mark.parametrize(
+    ("then", "reached"),
+    [
+        ((heartbeat(base_mode=129),), 4),
+        ((heartbeat(base_mode=1), heartbeat(base_mode=129)), None),
+        ((mavlink.MAVLink_mission_current_message(4, 5),), 4),
+        ((mavlink.MAVLink_mission_current_message(4, 9),), None),
+        ((mavlink.MAVLink_mission_current_message(0, 5),), None),
+        ((mavlink.MAVLink_extended_sys_state_message(0, 1), mavlink.MAVLink_mission_current_message(0, 5)), 4),
+    ],
+)
+def test_what_was_reached_is_of_this_flight_and_this_mission_and_does_not_lie_ahead(
+    then: tuple[Any, ...], reached: int | None
+) -> None:
+    current, at = mavlink.MAVLink_mission_current_message(4, 5), mavlink.MAVLink_mission_item_reached_message(4)
+    flying = (heartbeat(base_mode=129), mavlink.MAVLink_extended_sys_state_message(0, 2), current, at)
+    state = after(*flying, *then)
+    assert state is not None
+    assert state.mission_reached == reached
+
+
 def test_the_missions_id_is_read_although_the_dialect_does_not_know_the_field() -> None:
     codec = mavlink.MAVLink(None, 1, 1)
     message = mavlink.MAVLink_mission_current_message(7, 12, 3, 1)
