@@ -66,7 +66,8 @@ class CommandRun:
 
     Ends in Done(None), Failed(RefusedError) or Failed(SilentError). ``once``: after silence it is sent again only when
     the vehicle's state shows that it was not carried out. ``confirm``: whether a state shows that it was; that
-    settles a lost acknowledgement. Feed it states as they come: ``t_mono_s`` in them and ``now_s`` are one clock.
+    settles a lost acknowledgement. ``taken``: results after which it is done. Feed it states as they come:
+    ``t_mono_s`` in them and ``now_s`` are one clock.
     """
 
     def __init__(
@@ -77,10 +78,11 @@ class CommandRun:
         own: tuple[int, int] = GROUND_STATION,
         once: bool = False,
         confirm: Callable[[VehicleState], bool] | None = None,
+        taken: frozenset[int] = frozenset({ACCEPTED}),
         timeout_s: float | None = None,
     ) -> None:
         self._message, self._endpoints = message, Endpoints(target, own)
-        self._once, self._confirm = once, confirm
+        self._once, self._confirm, self._taken = once, confirm, taken
         self._look_s = LOOKS_S.get(message.command, LOOK_S)
         usual_s = max(TIMEOUT_S, LOOKS * self._look_s) if once else TIMEOUT_S
         self._timeout_s = usual_s if timeout_s is None else timeout_s
@@ -140,7 +142,7 @@ class CommandRun:
         return [Send(self._message)]
 
     def _on_result(self, message: Message, now_s: float) -> list[Action]:
-        if message.result == ACCEPTED:
+        if message.result in self._taken:
             return self._done()
         if message.result == IN_PROGRESS:
             self._in_progress, self._deadline_s = True, now_s + PROGRESS_TIMEOUT_S

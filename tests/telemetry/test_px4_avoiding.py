@@ -108,6 +108,7 @@ def test_a_pause_on_the_way_stops_it_and_resume_goes_on() -> None:
     it.advance(5.0)
     assert it.truth[0] == pytest.approx(stood_m, abs=2 * HOVERS_M)
     assert it.avoiding.flight_status().phase == "paused"
+    assert it.avoiding.detour.is_paused
     it.perform(it.avoiding.resume(it.now_s))
     it.until(lambda: it.state.mode == "RTL")
     assert max(n for _, n, _ in it.trail) > 59
@@ -172,17 +173,18 @@ def test_another_mode_is_somebody_who_has_taken_over() -> None:
     assert it.avoiding.released == "The flight mode was changed to LAND: the pilot took over."
 
 
-def test_a_place_is_sent_again_when_home_moves() -> None:
+@pytest.mark.parametrize("by_m", [-4.0, 4.0])
+def test_home_that_somebody_moves_changes_no_height(by_m: float) -> None:
     it = px4_craft(Wall(25, 14))
     it.until(lambda: state(it) == "offset" and it.truth[0] > 28)
     pilot, sent = it.bench.vehicle.autopilot, len(it.repositions())
+    flown_m, ordered_m = it.truth[2], it.repositions()[-1].z
     n, e, u = pilot.home_neu
-    pilot.home_neu = (n, e, u + 1.0)
-    it.advance(1.0)
-    again = it.repositions()[sent]
-    before = it.repositions()[sent - 1]
-    assert (again.x, again.y) == (before.x, before.y)
-    assert again.z == pytest.approx(before.z + 1.0, abs=0.06)
+    pilot.home_neu = (n, e, u + by_m)
+    it.until(lambda: it.truth[0] > 57)
+    assert len(it.repositions()) > sent, "the next place of the rest"
+    assert {round(order.z, 2) for order in it.repositions()[sent:]} == {round(ordered_m, 2)}
+    assert all(up_m == pytest.approx(flown_m, abs=1.5) for _, north_m, up_m in it.trail if north_m > 29)
 
 
 @pytest.mark.parametrize("speed_m_s", [1.0, 2.0, 3.0, 5.0, 8.0])

@@ -289,6 +289,23 @@ def test_it_goes_where_it_is_told_above_the_sea() -> None:
     assert bench.vehicle.autopilot.mode.name == "HOLD"
 
 
+def test_a_place_that_changes_no_mode_is_carried_out_and_answered_with_unsupported() -> None:
+    bench = hovering()
+    up_m, nan = 803.0 + bench.vehicle.autopilot.p_neu[2], math.nan
+    order = wire.MAVLink_command_int_message(1, 1, 0, REPOSITION, 0, 0, -1, 0, 0, nan, LAT + 10_000, LON, up_m)
+    assert bench.send(order)[0].result == UNSUPPORTED
+    bench.advance(12.0)
+    began_m = bench.vehicle.truth.p_neu[0]
+    assert began_m > 10.0
+    assert bench.command(REPOSITION, -1, 0, 0, nan, nan, nan, nan) == UNSUPPORTED
+    bench.advance(12.0)
+    assert bench.vehicle.truth.p_neu[0] < began_m + 15.0
+    assert mode(bench, RTL) == ACCEPTED
+    assert bench.send(order)[0].result == UNSUPPORTED
+    bench.advance(1.0)
+    assert bench.vehicle.autopilot.mode.name == "RTL"
+
+
 @pytest.mark.fact("P36")
 def test_offboard_needs_a_stream_and_ends_without_it() -> None:
     bench = hovering()

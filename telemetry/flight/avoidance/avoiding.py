@@ -20,7 +20,7 @@ from telemetry.flight.avoidance.detour_state import DetourParams
 from telemetry.flight.avoidance.fence_aboard import FenceAboard
 from telemetry.flight.avoidance.pilot_watch import PilotWatch
 from telemetry.flight.avoidance.regions import FASTER_M_S, Regions, Sight, braking_of, largest_speed
-from telemetry.flight.guided.helm import Helm
+from telemetry.flight.guided.helm import Helm, from_the_same_home
 from telemetry.flight.guided.remaining_mission import RemainingMission
 from telemetry.mavlink.actions import Action, Message
 from telemetry.mavlink.conversation import GROUND_STATION
@@ -222,6 +222,8 @@ class Avoiding:
         return [*self._helm.on_message(message, now_s), *self._look(now_s)]
 
     def on_state(self, state: VehicleState, now_s: float) -> list[Action]:
+        if self._state is not None and self.is_engaged and self._helm.orders.counts_from_sea:
+            state = from_the_same_home(state, self._state)
         self._state = state
         self._slowing.on_state(state)
         self.detour.trail.on_state(state)

@@ -16,12 +16,15 @@ from telemetry.flight.guided.handover import Handover, is_fresh
 from telemetry.flight.guided.orders import GROUND_SPEED, GuidedOrders, Place
 from telemetry.flight.guided.pending_command import PendingCommand, Then
 from telemetry.mavlink.actions import Action, Message, Send
+from telemetry.mavlink.commands import ACCEPTED, UNSUPPORTED
 from telemetry.mavlink.conversation import GROUND_STATION, Endpoints
 from telemetry.topics.vehicle import VehicleState
 
 STANDS_M_S = 0.4
 MODE_SHOWS_S = 3.0
 FALLBACK_DECEL_M_S2 = 1.5
+PAUSED = frozenset({ACCEPTED, UNSUPPORTED})
+"""PX4's commander does not know a change of place that changes no mode; its navigator carries it out."""
 
 
 class Helm:
@@ -90,11 +93,21 @@ class Helm:
         self._handover, self.failed = None, ""
         mode, again = self.orders.stop_modes[0], self._stops
         self._stops = True
-        is_in_it = self._mode == mode or (self._state is not None and self._state.mode == mode)
-        if not (self.orders.holds_where_it_is_guided and is_in_it):
+        if not self.orders.holds_where_it_is_guided:
             return self.change_mode(mode, now_s)
+        shows = self._state is not None and self._state.mode == mode
+        if shows and self._mode in ("", mode):
+            self._mode = mode
+            return [] if again else self._pause(now_s)
+        if again and self._mode == mode and self._pending.is_under_way:
+            return []
+        # It may fly to a place in that mode already, which the mode alone does not end.
+        then = self._pause if shows or self._mode else None
         self._mode = mode
-        return [] if again else self._pending.begin(self.orders.pause(), now_s)
+        return self._command_mode(now_s, then)
+
+    def _pause(self, now_s: float) -> list[Action]:
+        return self._pending.begin(self.orders.pause(), now_s, taken=PAUSED)
 
     def stop_in_guided(self, state: VehicleState, now_s: float, *, radius_m: float = 1.0) -> list[Action]:
         """The same without leaving the mode: ArduPilot is sent to where it can stand still."""
@@ -166,8 +179,6 @@ class Helm:
     def _again_if_needed(self, now_s: float) -> list[Action]:
         if self._handover is None or self._state is None or self._state.mode != self.guided_mode:
             return []
-        if self.orders.counts_from_sea and self._handover.follow_home(here_of(self._state).home_alt_amsl_m):
-            return self._send_place(now_s)
         return self._send_place(now_s) if self._handover.must_be_sent_again(self._state, now_s) else []
 
     def _send_place(self, now_s: float) -> list[Action]:
@@ -209,6 +220,14 @@ def here_of(state: VehicleState) -> Place:
     assert state.alt_rel_home_m is not None
     home_alt_m = math.nan if state.alt_amsl_m is None else state.alt_amsl_m - state.alt_rel_home_m
     return Place(state.lat_deg, state.lon_deg, state.alt_rel_home_m, home_alt_m, state.heading_rad)
+
+
+def from_the_same_home(state: VehicleState, before: VehicleState) -> VehicleState:
+    """Its height counted from where home was: who moves home meanwhile changes no height that is told above the sea."""
+    alt_amsl_m, before_amsl_m, before_rel_m = state.alt_amsl_m, before.alt_amsl_m, before.alt_rel_home_m
+    if alt_amsl_m is None or before_amsl_m is None or before_rel_m is None:
+        return state
+    return replace(state, alt_rel_home_m=alt_amsl_m - (before_amsl_m - before_rel_m))
 
 
 def moved(place: Place, north_m: float, east_m: float, up_m: float) -> Place:

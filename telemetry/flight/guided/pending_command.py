@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from telemetry.errors import TelemetryError
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Send
-from telemetry.mavlink.commands import CommandRun
+from telemetry.mavlink.commands import ACCEPTED, CommandRun
 from telemetry.mavlink.conversation import Endpoints
 from telemetry.topics.vehicle import VehicleState
 
@@ -32,11 +32,12 @@ class PendingCommand:
         *,
         once: bool = False,
         confirm: Callable[[VehicleState], bool] | None = None,
+        taken: frozenset[int] = frozenset({ACCEPTED}),
         then: Then | None = None,
     ) -> list[Action]:
-        """In place of the one before; ``once`` and ``confirm`` as in CommandRun."""
+        """In place of the one before; ``once``, ``confirm`` and ``taken`` as in CommandRun."""
         self._run = CommandRun(
-            message, target=self._endpoints.vehicle, own=self._endpoints.own, once=once, confirm=confirm
+            message, target=self._endpoints.vehicle, own=self._endpoints.own, once=once, confirm=confirm, taken=taken
         )
         self._then = then
         return self._pass_on(self._run.start(now_s), now_s)

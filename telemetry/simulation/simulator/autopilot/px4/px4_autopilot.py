@@ -177,24 +177,24 @@ class Px4Pilot(Px4Flying):
         return "accepted"
 
     def go_to(self, goal_neu: Vec3, *, heading_rad: float | None = None, hold: bool = True) -> Verdict:
-        """``hold``: changes to HOLD for it."""
+        """``hold``: changes to HOLD for it; only then its commander knows the order that its navigator carries out."""
         held = self._hold(may_change=hold)
         if held is None:
-            return "denied"
+            return "denied" if hold else "unsupported"
         held.go_to(self, goal_neu)
         if heading_rad is None:
             self.face(goal_neu, at_least_m=self.parameters["NAV_ACC_RAD"])
         else:
             self.heading_goal_rad = heading_rad
-        return "accepted"
+        return "accepted" if hold else "unsupported"
 
     def pause(self, *, hold: bool = True) -> Verdict:
-        """Stops, and holds where it comes to rest."""
+        """Stops, and holds where it comes to rest; ``hold`` as in ``go_to``."""
         held = self._hold(may_change=hold)
         if held is None:
-            return "denied"
+            return "denied" if hold else "unsupported"
         held.enter(self)
-        return "accepted"
+        return "accepted" if hold else "unsupported"
 
     def _hold(self, *, may_change: bool) -> Px4Hold | None:
         """The mode HOLD, into which it is brought if it may be; None: it cannot be had."""

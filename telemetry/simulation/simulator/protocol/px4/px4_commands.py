@@ -121,7 +121,7 @@ class Px4Commands:
             heading_rad=heading if math.isfinite(heading) else None,
             hold=changes_mode,
         )
-        if verdict == "accepted" and order.params[0] > 0:
+        if verdict != "denied" and order.params[0] > 0:
             pilot.change_speed(1, order.params[0])
         return verdict
 
