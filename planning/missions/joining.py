@@ -59,6 +59,20 @@ def common_places(flown: Mission, planned: Mission, *, next_item: int) -> int:
     return count
 
 
+def as_planned(
+    taken_up: Mission, passed: Sequence[MissionItem], *, way_items: int, flown_items: int, next_item: int
+) -> tuple[Mission, int]:
+    """A mission that was taken up as its plan would be flown, and the item that is flown to (1 is the first).
+
+    ``way_items`` of it lead into the plan; ``passed``: the plan's items before those that follow, ``flown_items`` of
+    which were flown before. What is left out counts as flown once the plan's line is joined.
+    """
+    if next_item <= way_items:
+        return replace(taken_up, items=tuple(passed[:flown_items])), flown_items + 1
+    items = (*passed, *taken_up.items[way_items:])
+    return replace(taken_up, items=items), len(passed) + next_item - way_items
+
+
 def _places(items: Sequence[MissionItem]) -> list[tuple[int, tuple[int, int]]]:
     placed = [(k, item) for k, item in enumerate(items) if item.command in STRAIGHT]
     return [(k, (round(item.lat_deg * 1e7), round(item.lon_deg * 1e7))) for k, item in placed]

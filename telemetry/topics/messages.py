@@ -265,6 +265,12 @@ class PlanRecord:
     """``trajectory.csv`` with the paper's timing, if there is one."""
     taken_up: bool = False
     """In flight: the mission has no take-off, and begins at its first item's place, in the air."""
+    way_items: int = 0
+    """So many at its beginning lead into the plan; all others are the plan's own."""
+    passed_wpl: str = ""
+    """The plan's items before those, as ``mission_wpl``; empty where there are none."""
+    passed_flown: int = 0
+    """So many of them were flown when it was taken up; the others are left out."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,16 @@ from planning.basics.mav_cmd import MavCmd
 from planning.basics.plan_model import Home, Mission, MissionItem
 from planning.errors import CapacityError, MissionError
 from planning.missions.flown import flown_line
-from planning.missions.joining import ALIKE_M, HEADROOM_M, NEXT_M, Joining, common_places, joined_mission, joining
+from planning.missions.joining import (
+    ALIKE_M,
+    HEADROOM_M,
+    NEXT_M,
+    Joining,
+    as_planned,
+    common_places,
+    joined_mission,
+    joining,
+)
 from planning.missions.mission_items import Place
 from tests.planning.test_guided_ways import HOME, NORTH, WEST, at, flat, model
 
@@ -134,3 +144,17 @@ def test_what_begins_both_missions_alike_is_flown_up_to_where_the_vehicle_was() 
     assert common_places(old, new, next_item=6) == 5, "the second place lies behind it"
     assert common_places(old, new, next_item=9) == 6, "beyond the third they differ"
     assert common_places(mission(SQUARE[1:]), new, next_item=9) == 0
+
+
+@pytest.mark.parametrize(
+    ("next_item", "flown"),
+    [(1, 3), (2, 3), (3, 5), (4, 6), (5, 7)],
+    ids=["on the way", "still on it", "on the plan's line", "a place later", "and one more"],
+)
+def test_what_was_flown_is_known_through_a_second_joining(next_item: int, flown: int) -> None:
+    plan = mission()
+    here = MissionItem(MavCmd.NAV_WAYPOINT, 3, (0.0, 0.0, 0.0, 0.0), *at(DSM, 75.0, 66.0), UP_M)
+    taken_up = replace(plan, items=(here, here, *plan.items[5:]))
+    before, item = as_planned(taken_up, plan.items[:5], way_items=2, flown_items=3, next_item=next_item)
+    assert common_places(before, plan, next_item=item) == flown
+    assert common_places(taken_up, plan, next_item=next_item) == 0, "where it hovered is in no plan"

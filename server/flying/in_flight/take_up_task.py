@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planning.basics.plan_model import Firmware
+from planning.basics.plan_model import Firmware, Mission
 from planning.certificate.as_json import certificate_json
 from planning.formats.wpl import read_wpl, write_wpl
-from planning.missions.joining import common_places
+from planning.missions.joining import as_planned, common_places
 from planning.missions.vehicle_profile import dump_profile
 from planning.planner.request import effective_profile
 from server.flying.in_flight.way_task import with_seen
@@ -75,13 +75,12 @@ def make_take_up(asked: Asked, *, report: Progress) -> MadeTakeUp:
     plan, source, _ = last_plan.of(asked.directory, asked.document, report)
     report("Finding the way into the plan", None)
     planned = read_wpl(write_wpl(plan.mission))
-    before = None if asked.before is None else read_wpl(asked.before.mission_wpl)
-    flown_items = 0 if before is None else common_places(before, planned, next_item=asked.next_item)
+    flown_items = 0 if asked.before is None else _flown_items(asked.before, planned, asked.next_item)
     sent = _sent(asked, planned.firmware)
     places = {"fence": asked.aboard.fence, "rally": asked.aboard.rally} | sent
     flown = _flown(asked, PlacesOnboard(places["fence"], places["rally"], asked.aboard.unread))
     found = taken_up(_over(asked), planned, asked.state, flown, flown_items=flown_items, now_s=asked.now_mono_s)
-    text = write_wpl(found.mission)
+    text, passed = write_wpl(found.mission), replace(planned, items=planned.items[: found.joined.item])
     record = PlanRecord(
         t_utc_s=time.time(),
         name=asked.document.name,
@@ -97,6 +96,9 @@ def make_take_up(asked: Asked, *, report: Progress) -> MadeTakeUp:
         certificate_json="",
         plan_json=asked.document.model_dump_json(),
         taken_up=True,
+        way_items=len(found.mission.items) - len(planned.items) + found.joined.item,
+        passed_wpl=write_wpl(passed) if passed.items else "",
+        passed_flown=flown_items,
     )
     return MadeTakeUp(items_from_mission(read_wpl(text)), record, sent, _doc(found), found.begins)
 
@@ -116,6 +118,18 @@ def check_take_up(asked: Asked, onboard: OnboardMission, *, report: Progress) ->
         raise NotAllowedError(row.text, where="fence", advice=row.mend)
     found = certified_on_board(_over(asked), onboard, firmware, asked.state, _flown(asked, asked.aboard))
     return json.dumps(certificate_json(found), allow_nan=False)
+
+
+def _flown_items(before: PlanRecord, planned: Mission, next_item: int) -> int:
+    """Of the plan that is to be taken up: what both begin with alike, and was flown, whatever way led into the one
+    that is flown."""
+    flown = read_wpl(before.mission_wpl)
+    if before.taken_up:
+        passed = read_wpl(before.passed_wpl).items if before.passed_wpl else ()
+        flown, next_item = as_planned(
+            flown, passed, way_items=before.way_items, flown_items=before.passed_flown, next_item=next_item
+        )
+    return common_places(flown, planned, next_item=next_item)
 
 
 def _sent(asked: Asked, firmware: Firmware) -> dict[PlaceList, tuple[Item, ...]]:
