@@ -17,7 +17,7 @@ from server.flying.apart.other_vehicles import PENDING
 from server.flying.check_task import Checked
 from server.flying.checklist_desk import ChecklistDesk
 from server.flying.in_flight.take_up_task import Asked, MadeTakeUp
-from server.flying.in_flight.taking_up import FIRMWARES, UNTOUCHED, TakingUp, said_of, with_words
+from server.flying.in_flight.taking_up import FIRMWARES, TakingUp, with_words
 from server.flying.starting import Ready, check_start, preflight_now
 from server.flying.upload_task import MadeUpload
 from server.flying.work import FlightWork
@@ -103,6 +103,7 @@ class FlightDesk:
         self._aboard.on_link(status)
         if self._aboard.vehicle != before:
             self._at_fence, self._taken_up = "", None
+            self._taking_up.forget()
         self._checklist.on_link(status, armed=self._live.state is not None and self._live.state.armed)
         if self._ready is not None and not _still_holds(self._ready, status):
             self._ready = None
@@ -112,6 +113,8 @@ class FlightDesk:
         self._flight = flight
         if flight.phase != "paused" and not self._busy:
             self._taken_up = None
+        if flight.way == "auto" and flight.phase in ("taking_off", "flying") and not self._busy:
+            self._taking_up.forget()
         self.refresh()
 
     def on_others(self, row: CheckRow) -> None:
@@ -123,6 +126,7 @@ class FlightDesk:
     def on_disarmed(self) -> None:
         """A flight changes what was checked before it, the battery above all."""
         self._ready = None
+        self._taking_up.forget()
         self._checklist.forget("The vehicle was disarmed: each flight is ticked for itself.")
         self.refresh()
 
@@ -160,16 +164,17 @@ class FlightDesk:
         holding: ``resume`` flies that. Raises what is in the way, and says where that leaves the vehicle."""
         async with self._doing("Holding the vehicle"):
             self._ready = self._taken_up = None
-            taking, item, before = self._taking_up, self._taking_up.item(), self._taking_up.before()
-            await taking.hold(operator)
-            self._set_busy("Finding the way into the plan")
-            with said_of(UNTOUCHED):
-                asked, made = await taking.made(operator, body, item)
-            self._set_busy("Uploading")
+            taking = self._taking_up
+            taking.check_flies()
+            taking.begin_try()
             try:
+                await taking.hold(operator)
+                self._set_busy("Finding the way into the plan")
+                asked, made = await taking.made(operator, body)
+                self._set_busy("Uploading")
                 await self._put_on_board(operator, asked, made)
             except DescribedError as error:
-                raise with_words(error, await taking.what_is_aboard(operator, before)) from error
+                raise with_words(error, await taking.what_is_aboard(operator)) from error
             self._taken_up = made.doc
         return self.state
 
@@ -240,15 +245,17 @@ class FlightDesk:
     async def _put_on_board(self, operator: Operator, asked: Asked, made: MadeTakeUp) -> None:
         """Only what was read back, and certified as such, is taken up."""
         for kind, items in made.places.items():
+            self._taking_up.sends(places=True)
             report = await self._link.call(UploadPlaces(operator, kind, items, while_holding=True))
             if not report.verified:
                 raise _not_verified(report, _LISTS[kind])
         home = (asked.state.home_lat_deg or 0.0, asked.state.home_lon_deg or 0.0, made.record.home_alt_dsm_m or 0.0)
+        self._taking_up.sends(places=False)
         found = await self._send(operator, made.items, made.record, home, while_holding=True)
         self._set_busy("Certifying what is on board")
         self._aboard.certified(await self._taking_up.certificate(operator, asked, found))
+        await self._note()  # before: what fails here leaves it not taken up
         await self._taking_up.begin(operator, found.digest, made)
-        await self._note()
 
     async def _send(
         self,

@@ -156,7 +156,7 @@ class Bench:
     """Stands for all that hangs on the desk, but for the vehicle."""
 
     def __init__(self, made: Made, file: Path, lanes: tuple[Lane, Lane], *, is_alone: bool = True) -> None:
-        self.vehicle, self.plan = Vehicle(), made.plan()
+        self.made, self.vehicle, self.plan = made, Vehicle(), made.plan()
         self.plan_lane = lanes[0]
         self.live = Live(made.standing())
         self.watch = SimpleNamespace(avoidance=AvoidanceStatus())

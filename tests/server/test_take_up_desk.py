@@ -131,14 +131,14 @@ def test_an_upload_that_breaks_off_says_what_is_on_board_now(
 
 def px4_plan(bench: Bench) -> None:
     profile = bench.document.profile.model_copy(update={"firmware": "px4"})
-    _document(bench, profile=profile)
+    with_document(bench, profile=profile)
 
 
 def another_vehicle(bench: Bench) -> None:
-    _document(bench, profile=bench.document.profile.model_copy(update={"name": "Large hexa"}))
+    with_document(bench, profile=bench.document.profile.model_copy(update={"name": "Large hexa"}))
 
 
-def _document(bench: Bench, **fields: Any) -> None:
+def with_document(bench: Bench, **fields: Any) -> None:
     document = bench.document.model_copy(update=fields)
     bench.plan = bench.plan.model_copy(update={"document": document})
 
@@ -298,10 +298,14 @@ def test_one_that_does_not_come_to_rest_or_stands_on_the_ground_is_refused(
         monkeypatch.setattr("server.flying.in_flight.taking_up.HOLDS_WITHIN_S", 0.3)
         with pytest.raises(SilentError, match="does not stand still") as moves:
             await bench.desk.take_up(ME, TakeUpPlan(revision=3))
-        assert "the mission before is still on board" in moves.value.advice
+        assert "does not stand still yet, and the mission before is still on board" in moves.value.advice
+        bench.live.state = replace(bench.live.state, mode="AUTO")
+        with pytest.raises(SilentError) as flies:
+            await bench.desk.take_up(ME, TakeUpPlan(revision=3))
+        assert "The vehicle does not hold: it is in AUTO" in flies.value.advice
         bench.live.state = made.standing()
         with pytest.raises(NotAllowedError, match="not in the air"):
             await bench.desk.take_up(ME, TakeUpPlan(revision=3))
-        assert [type(request) for request in bench.vehicle.told] == [Pause]
+        assert [type(request) for request in bench.vehicle.told] == [Pause, Pause]
 
     runner.run(scenario())

@@ -19,7 +19,7 @@ SET_MODE, REPOSITION = mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_CMD_DO_REPOSITIO
 
 def shown(mode: str, t_s: float, *, speed_m_s: float = 0.0) -> VehicleState:
     told: dict[str, Any] = {"lat_deg": 46.0, "lon_deg": 7.0, "alt_rel_home_m": 10.0, "alt_amsl_m": 510.0}
-    times = {"heartbeat_t_mono_s": t_s, "position_t_mono_s": t_s}
+    times: dict[str, Any] = {"heartbeat_t_mono_s": t_s, "position_t_mono_s": t_s}
     return VehicleState(1, 1, autopilot="px4", armed=True, mode=mode, ground_speed_m_s=speed_m_s, **told, **times)
 
 

@@ -4,11 +4,9 @@ what came on board is judged once more before it is the mission that ``resume`` 
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 from planning.errors import DescribedError
 from planning.missions.vehicle_profile import parse_profile
@@ -27,6 +25,7 @@ from server.workspace import Workspace
 from telemetry.bus.link_client import LinkClient
 from telemetry.errors import NotAllowedError, NoVehicleError, SilentError, TelemetryError
 from telemetry.flight.guided.beginning import why_moves
+from telemetry.flight.guided.handover import is_fresh
 from telemetry.flight.home_watch import home_of_takeoff
 from telemetry.flight.preflight.parameters import NAMES
 from telemetry.mavlink.autopilot_orders import HOLD_MODES
@@ -40,16 +39,18 @@ from telemetry.topics.vehicle import VehicleState
 E = TypeVar("E", bound=DescribedError)
 HOLDS_WITHIN_S, LOOK_EVERY_S, STILL_S = 30.0, 0.1, 1.0
 """So long it must be still, at a stretch, before its place is taken for the beginning."""
-UNTOUCHED = "The vehicle holds, and the mission before is still on board: Resume flies that."
+RETRY = "Try again, return home, or land."
 FIRMWARES = {"ardupilot": "ArduPilot", "px4": "PX4"}
 
 
 @dataclass(frozen=True, slots=True)
 class Before:
-    """What was on board before anything was sent."""
+    """What was on board before anything was sent in this flight."""
 
     digest: str | None
     record: PlanRecord | None
+    item: int
+    """That was flown to."""
 
 
 class TakingUp:
@@ -67,26 +68,46 @@ class TakingUp:
     ) -> None:
         self._link, self._live, self._workspace, self._library = link, live, workspace, library
         self._lane, self._watch, self._aboard = lane, watch, aboard
+        self.forget()
 
-    async def hold(self, operator: Operator) -> None:
-        """Until it has stood still for a while."""
+    def forget(self) -> None:
+        """Another flight, or what is on board is flown: no try that failed counts any more."""
+        self._before: Before | None = None
+        self._sent: Literal["nothing", "mission", "places"] = "nothing"
+
+    def check_flies(self) -> None:
         state = self._state()
         if not (state.armed and is_in_the_air(state)):
             raise NotAllowedError("The vehicle is not in the air.", advice="Upload the plan and check it.")
+
+    def begin_try(self) -> None:
+        """A try that failed has changed what is on board, not what this flight has flown."""
+        if self._before is None or self._sent == "nothing":
+            record = self._aboard.record
+            digest = None if record is None else record.digest
+            self._before = Before(digest, record, item_of(self._state()) or 1)
+
+    def sends(self, *, places: bool) -> None:
+        """A list is about to be sent."""
+        self._sent = "places" if places or self._sent == "places" else "mission"
+
+    async def hold(self, operator: Operator) -> None:
+        """Until it has stood still for a while."""
         await self._link.call(Pause(operator))
         end_s, still_s = time.monotonic() + HOLDS_WITHIN_S, 0.0
         while still_s < STILL_S:
             if time.monotonic() > end_s:
                 what = f"The vehicle does not stand still within {HOLDS_WITHIN_S:.0f} s."
-                raise SilentError(what, advice="Look at it. Nothing was sent: the mission before is still on board.")
+                raise SilentError(what, advice="Look at it.")
             await asyncio.sleep(LOOK_EVERY_S)
             still_s = still_s + LOOK_EVERY_S if _holds(self._state()) else 0.0
 
-    async def made(self, operator: Operator, body: TakeUpPlan, item: int) -> tuple[Asked, MadeTakeUp]:
-        """``item``: that was flown to before the hold, of the mission on board; nothing is sent."""
+    async def made(self, operator: Operator, body: TakeUpPlan) -> tuple[Asked, MadeTakeUp]:
+        """Nothing is sent."""
         plan = self._workspace.state
         check_uploadable(plan, body.revision)
-        document, state, before = plan.document, self._state(), self._aboard.record
+        assert self._before is not None
+        document, state, before = plan.document, self._state(), self._before.record
         _check_same(document.profile.firmware, document.profile.name, state, before)
         terrain = terrain_of(FlownOver(document.terrain_id or ""), self._library.terrains())
         if terrain is None:
@@ -99,7 +120,7 @@ class TakingUp:
             document,
             terrain.name,
             before,
-            item,
+            self._before.item,
             state,
             time.monotonic(),
             await self._link.call(ReadParameters(NAMES["px4" if state.autopilot == "px4" else "ardupilot"])),
@@ -116,35 +137,38 @@ class TakingUp:
 
     async def certificate(self, operator: Operator, asked: Asked, onboard: OnboardMission) -> str:
         """Of what was read back, as JSON."""
-        now = replace(asked, state=self._state(), now_mono_s=time.monotonic(), aboard=await self._places(operator))
+        aboard, maps = await self._places(operator), await asyncio.to_thread(seen_maps, self._watch)
+        now = replace(asked, state=self._state(), now_mono_s=time.monotonic(), aboard=aboard, maps=maps)
         return await self._lane.call(check_take_up, now, onboard)
 
     async def begin(self, operator: Operator, digest: str, made: MadeTakeUp) -> None:
         await self._link.call(TakeUp(operator, digest, *made.begins))
+        self.forget()
 
-    def before(self) -> Before:
-        record = self._aboard.record
-        return Before(None if record is None else record.digest, record)
-
-    def item(self) -> int:
-        """Of the mission on board, that is flown to."""
-        return item_of(self._state()) or 1
-
-    async def what_is_aboard(self, operator: Operator, before: Before) -> str:
-        """After something went wrong on the way: read now, not remembered."""
+    async def what_is_aboard(self, operator: Operator) -> str:
+        """After something went wrong on the way: read now, not remembered. What Resume does is the link's to say."""
+        does, before = self._does(), self._before
+        if self._sent == "nothing":
+            return f"{does}, and the mission before is still on board: Resume flies that."
         try:
             found = await self._link.call(Download(operator))
         except TelemetryError as error:
-            return (
-                f"The vehicle holds. What is on board is not known ({error.what.rstrip('.')}): Resume is refused."
-                " Try again, return home, or land."
-            )
-        if before.digest is not None and found.digest == before.digest:
-            return UNTOUCHED
-        return (
-            f"The vehicle holds. On board are {len(found.items)} items that are not the mission before, and they are"
-            " not certified: Resume is refused. Try again, return home, or land."
-        )
+            return f"{does}. What is on board is not known ({error.what.rstrip('.')}): Resume is refused. {RETRY}"
+        if before is None or found.digest != before.digest:
+            are = f"On board are {len(found.items)} items that are not the mission before, and they are not taken up"
+            return f"{does}. {are}: Resume is refused. {RETRY}"
+        if self._sent == "places":
+            are = "The mission before is still on board, but fence or rally points of the new plan were sent"
+            return f"{does}. {are}: Resume is refused. {RETRY}"
+        return f"{does}, and the mission before is still on board: Resume flies that."
+
+    def _does(self) -> str:
+        state = self._live.state
+        if state is None or not is_fresh(state, time.monotonic()):
+            return "Whether the vehicle holds is not known"
+        if state.mode not in HOLD_MODES.get(state.autopilot, ()):
+            return f"The vehicle does not hold: it is in {state.mode}"
+        return "The vehicle holds" if why_moves(state) is None else "The vehicle does not stand still yet"
 
     async def _places(self, operator: Operator) -> PlacesOnboard:
         try:
@@ -157,15 +181,6 @@ class TakingUp:
         if self._live.state is None:
             raise NoVehicleError("No vehicle is connected.", advice="Connect one first.")
         return self._live.state
-
-
-@contextlib.contextmanager
-def said_of(words: str) -> Iterator[None]:
-    """Whatever is refused in it says this as well."""
-    try:
-        yield
-    except DescribedError as error:
-        raise with_words(error, words) from error
 
 
 def with_words(error: E, words: str) -> E:

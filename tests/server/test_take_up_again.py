@@ -1,0 +1,137 @@
+"""Plans that are taken up one after the other in one flight, and tries that fail on the way."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from server.errors import StorageError
+from server.schemas import RallyDoc, TakeUpPlan
+from server.work.jobs import Lane
+from telemetry.errors import NotAllowedError, TransferError
+from telemetry.topics.messages import FlightStatus, LinkStatus
+from telemetry.topics.requests import Pause, TakeUp
+from tests.server.flying_desk_bench import ME, QUAD, Bench, Made
+from tests.server.test_take_up_desk import (  # noqa: F401
+    HOLDS,
+    another_vehicle,
+    flown,
+    hovering,
+    lanes,
+    made,
+    px4_plan,
+    runner,
+    with_document,
+)
+
+pytestmark = pytest.mark.xdist_group("flying-desk")
+Scenario = Callable[[Bench], Awaitable[None]]
+Play = Callable[[Scenario], None]
+AGAIN = TakeUpPlan(revision=3)
+
+
+@pytest.fixture
+def play(made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path) -> Play:  # noqa: F811
+    def played(scenario: Scenario) -> None:
+        async def whole() -> None:
+            await scenario(await flown(made, tmp_path, lanes))
+
+        runner.run(whole())
+
+    return played
+
+
+def test_after_a_try_that_failed_the_flight_is_still_the_one_that_was_started(play: Play) -> None:
+    async def scenario(bench: Bench) -> None:
+        bench.vehicle.breaks_off = "mixes"
+        with pytest.raises(TransferError):
+            await bench.desk.take_up(ME, AGAIN)
+        mixed = LinkStatus(time.monotonic() + 1.0, adopted=QUAD, mission_state="verified", mission_digest="mixed")
+        bench.desk.on_link(mixed)
+        bench.desk.on_flight(FlightStatus(way="auto", phase="paused"))
+        own = bench.plan
+        for mishap, words in ((px4_plan, "made for PX4"), (another_vehicle, "flies as")):
+            mishap(bench)
+            with pytest.raises(NotAllowedError) as refused:
+                await bench.desk.take_up(ME, AGAIN)
+            assert words in refused.value.what
+            assert "3 items that are not the mission before" in refused.value.advice
+            assert "Resume is refused" in refused.value.advice
+            bench.plan = own
+        bench.vehicle.breaks_off = ""
+        assert (await bench.desk.take_up(ME, AGAIN)).taken_up is not None
+        another_vehicle(bench)
+        with pytest.raises(NotAllowedError, match="flies as") as after:
+            await bench.desk.take_up(ME, AGAIN)
+        assert HOLDS in after.value.advice, "what was taken up is what Resume flies"
+
+    play(scenario)
+
+
+def test_what_was_flown_is_left_out_of_the_second_plan_as_well(play: Play) -> None:
+    async def scenario(bench: Bench) -> None:
+        await bench.desk.take_up(ME, AGAIN)
+        first = bench.aboard.record
+        assert first is not None
+        at = first.way_items + 3
+        then = next(item for item in bench.vehicle.items[at - 1 :] if item.command == 16)
+        place: dict[str, Any] = {"lat_deg": then.lat_deg, "lon_deg": then.lon_deg, "alt_rel_home_m": then.alt_m}
+        bench.live.state = replace(hovering(bench.made), mission_item=at, **place)
+        await bench.desk.take_up(ME, AGAIN)
+        second = bench.aboard.record
+        assert second is not None
+        assert second.passed_flown >= first.passed_flown + 1, "of the plan, through two ways into it"
+        assert second.passed_wpl.startswith(first.passed_wpl.rstrip()[:200])
+
+    play(scenario)
+
+
+def test_rally_points_that_were_sent_before_the_mission_failed_are_said(play: Play) -> None:
+    async def scenario(bench: Bench) -> None:
+        home_lat_deg, home_lon_deg = bench.made.home
+        with_document(bench, rally=[RallyDoc(id="r", lat_deg=home_lat_deg, lon_deg=home_lon_deg, alt_rel_home_m=60.0)])
+        bench.vehicle.breaks_off = "keeps"
+        with pytest.raises(TransferError) as refused:
+            await bench.desk.take_up(ME, AGAIN)
+        assert "fence or rally points of the new plan were sent" in refused.value.advice
+        assert "Resume is refused" in refused.value.advice
+
+    play(scenario)
+
+
+def test_what_cannot_be_written_down_is_not_taken_up(play: Play, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scenario(bench: Bench) -> None:
+        saves = iter((None, StorageError("The disk is full.")))
+
+        def save() -> None:
+            if (error := next(saves)) is not None:
+                raise error
+
+        monkeypatch.setattr(bench.aboard, "save", save)
+        with pytest.raises(StorageError, match="disk is full") as refused:
+            await bench.desk.take_up(ME, AGAIN)
+        assert "they are not taken up: Resume is refused" in refused.value.advice
+        assert not [request for request in bench.vehicle.told if isinstance(request, TakeUp)]
+
+    play(scenario)
+
+
+def test_what_is_seen_during_the_upload_counts(play: Play, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scenario(bench: Bench) -> None:
+        looked: list[int] = []
+
+        def maps(_: Any) -> tuple[Any, ...]:
+            looked.append(len([request for request in bench.vehicle.told if isinstance(request, Pause)]))
+            return ()
+
+        monkeypatch.setattr("server.flying.in_flight.taking_up.seen_maps", maps)
+        await bench.desk.take_up(ME, AGAIN)
+        assert looked == [1, 1], "before it is made, and when it was read back"
+
+    play(scenario)
