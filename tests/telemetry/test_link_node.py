@@ -27,7 +27,17 @@ from telemetry.link.session import AVOIDS_AGAIN
 from telemetry.simulation.simulator.run import SimOptions, flying
 from telemetry.topics.messages import FlightStatus, LinkStatus, ServerAlive, Topic, VehicleText
 from telemetry.topics.obstacles import AvoidanceStatus
-from telemetry.topics.requests import Arm, Connect, Operator, Pause, ReadParameters, SetAvoidance, StartAuto, Upload
+from telemetry.topics.requests import (
+    Arm,
+    Connect,
+    Operator,
+    Pause,
+    ReadParameters,
+    Resume,
+    SetAvoidance,
+    StartAuto,
+    Upload,
+)
 from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.bus_runs import ROOT, run
 from tests.telemetry.link_bench import free_port, until
@@ -177,6 +187,35 @@ def test_killed_in_flight_it_is_started_again_and_finds_vehicle_mission_and_flig
                 f"start mission {report.onboard.digest[:12]} at item 1",
                 "avoidance on again",
             ]
+
+    run(whole)
+
+
+def test_a_mission_that_was_paused_when_the_node_was_killed_is_gone_on_with_and_no_other(tmp_path: Path) -> None:
+    async def whole() -> None:
+        where: dict[str, Any] = {"link": "tcpin:127.0.0.1:0", "speedup": 8.0, "boot_s": 0.5}
+        options = SimOptions(LAT_DEG, LON_DEG, ALT_M, **where, parameters=QUICKLY_DOWN)
+        async with flying(options) as simulator, station(tmp_path) as (node, client):
+            node.start("--link", simulator.address.replace("tcpin", "tcp"))
+            await until(lambda: node.status.state == "live" and node.state.ready_to_arm and node.state.estimator_ok)
+            report = await client.call(Upload(ME, items(6), LAT_DEG, LON_DEG, ALT_M))
+            await client.call(StartAuto(ME, report.onboard.digest))
+            await until(lambda: node.flight.phase == "flying")
+            await client.call(Pause(ME))
+            await until(lambda: node.flight.phase == "paused" and (node.state.ground_speed_m_s or 0.0) < 0.2)
+            node.kill_and_start_again()
+            await until(lambda: node.status.state == "live" and node.flight.phase == "paused")
+            await client.call(Resume(ME))
+            await until(lambda: node.flight.phase == "flying")
+
+            await client.call(Pause(ME))
+            await until(lambda: node.flight.phase == "paused" and (node.state.ground_speed_m_s or 0.0) < 0.2)
+            other = items(3)
+            await client.call(Upload(ME, other, LAT_DEG, LON_DEG, ALT_M, while_holding=True))
+            node.kill_and_start_again()
+            await until(lambda: node.status.state == "live" and node.flight.phase == "paused")
+            with pytest.raises(MissionUnknownError, match="Another mission is on board"):
+                await client.call(Resume(ME))
 
     run(whole)
 
