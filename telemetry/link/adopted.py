@@ -114,7 +114,7 @@ class AdoptedVehicle:
 
     @property
     def round_trip_s(self) -> float | None:
-        return self.ways.chosen.clock.round_trip_s
+        return self.ways.chosen.round_trip_s(self._clock())
 
     def moved(self, candidate: Candidate, line: Line) -> None:
         """It sends from another port now, as the operator says."""

@@ -154,6 +154,31 @@ def test_a_pause_is_obeyed_within_a_second_of_the_change_over() -> None:
     run(whole)
 
 
+def test_a_way_over_which_nothing_reaches_the_vehicle_is_left_though_it_is_heard() -> None:
+    async def whole() -> None:
+        async with (
+            vehicle(speedup=1.0) as (simulator, port),
+            lossy_udp(port, loss=0.0) as one,
+            lossy_udp(port, loss=0.0, delay_s=0.1) as other,
+            console() as bench,
+        ):
+            obeyed = Obeying(simulator)
+            await reached(bench, at(one), at(other))
+            await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
+            one.is_deaf, before = True, len(obeyed.orders)
+            await until(lambda: used(bench) == at(other), 10.0)
+            assert any("unanswered" in text for text in bench.texts)
+            deaf = way(bench, at(one))
+            assert deaf is not None
+            assert (deaf.round_trip_s, deaf.quality) == (None, 1.0)
+            assert deaf.silent_s is not None
+            assert deaf.silent_s < 1.0
+            await bench.handle(Arm(ME))
+            assert {peer for peer, *_ in obeyed.orders[before:]} == {other.far_address}
+
+    run(whole)
+
+
 def test_the_way_in_use_can_be_taken_away_and_a_new_one_added_and_the_last_one_releases() -> None:
     async def whole() -> None:
         async with (

@@ -40,6 +40,8 @@ class Carrier:
     boot_s: float = -90.0
     """The clock at its far end is so much ahead of ours."""
     cut: bool = False
+    deaf: bool = False
+    """Nothing that goes out over it arrives."""
     sequence: int = 0
     due_s: float = 0.0
     underway: list[tuple[float, Any]] = field(default_factory=list)
@@ -48,7 +50,9 @@ class Carrier:
 class Field:
     """Ways over carriers in simulated time; ``changes`` with the time of each."""
 
-    def __init__(self, seed: int = 0, **carriers: Carrier) -> None:
+    def __init__(self, seed: int = 0, *, routed: bool = False, answers: bool = True, **carriers: Carrier) -> None:
+        """``routed``: each answer comes over all of them."""
+        self._routed, self._answers = routed, answers
         self.now_s, self._random = 100.0, random.Random(seed)
         addresses = {"radio": RADIO, "wifi": WIFI, "lte": LTE}
         self.carriers = {addresses[name]: carrier for name, carrier in carriers.items()}
@@ -75,9 +79,11 @@ class Field:
                 self.ways.hear(address, message, self.now_s)
         for way, question in self.ways.on_tick(self.now_s):
             carrier = self.carriers[way.address]
-            if self._random.random() >= carrier.loss and not carrier.cut:
+            if self._answers and self._random.random() >= carrier.loss and not (carrier.cut or carrier.deaf):
                 tc1 = int((self.now_s + carrier.delay_s + carrier.boot_s) * 1e9)
-                self._send(carrier, mavlink.MAVLink_timesync_message(tc1, question.ts1), 2 * carrier.delay_s)
+                answer = mavlink.MAVLink_timesync_message(tc1, question.ts1)
+                for back in self.carriers.values() if self._routed else [carrier]:
+                    self._send(back, answer, carrier.delay_s + back.delay_s)
         if (change := self.ways.choose(self.now_s)) is not None:
             self.changes.append((self.now_s, change))
 
@@ -331,6 +337,67 @@ def test_an_answer_in_the_old_dialect_is_the_same_answer() -> None:
 
 def test_only_what_the_dialect_has_is_listed() -> None:
     assert {kind.msgname for kind in mavlink.mavlink_map.values()} >= ANSWERS
+
+
+@pytest.mark.parametrize("routed", [False, True])
+def test_a_way_over_which_the_vehicle_hears_nothing_is_left_and_not_used_again_before_it_does(routed: bool) -> None:
+    field_ = Field(wifi=Carrier(), lte=Carrier(delay_s=0.15), routed=routed)
+    field_.run(10.0)
+    assert field_.used == WIFI
+    field_.carriers[WIFI].deaf = True
+    field_.run(5.0)
+    ((_, change),) = field_.changes
+    assert (field_.used, change.is_loss) == (LTE, True)
+    assert "unanswered" in change.why
+    deaf, heard_ = field_.ways.status(field_.now_s)
+    assert (deaf.address, deaf.round_trip_s, deaf.quality) == (WIFI, None, pytest.approx(1.0, abs=0.1))
+    assert heard_.round_trip_s == pytest.approx(0.3, abs=2 * TICK_S)
+    field_.run(30.0)
+    assert len(field_.changes) == 1
+    field_.carriers[WIFI].deaf, back_s = False, field_.now_s
+    field_.run(30.0)
+    assert field_.used == WIFI
+    assert field_.changes[-1][0] - back_s >= SETTLE_S
+
+
+def test_over_a_way_that_is_deaf_the_state_is_still_better_than_none() -> None:
+    field_ = Field(wifi=Carrier(), lte=Carrier())
+    field_.run(5.0)
+    field_.carriers[LTE].deaf = True
+    field_.run(6.0)
+    field_.carriers[WIFI].cut = True
+    field_.run(2.0)
+    assert field_.used == LTE
+
+
+def test_a_vehicle_that_answers_no_question_any_more_stays_on_its_way() -> None:
+    field_ = Field(wifi=Carrier(), lte=Carrier(hz=9.0, delay_s=0.2))
+    field_.run(10.0)
+    field_._answers = False
+    field_.run(30.0)
+    assert (field_.used, field_.changes) == (WIFI, [])
+    silent = Field(wifi=Carrier(), answers=False)
+    silent.run(30.0)
+    (shown,) = silent.ways.status(silent.now_s)
+    assert (shown.round_trip_s, shown.quality) == (None, 1.0)
+
+
+def test_what_is_lost_both_ways_is_hardly_ever_taken_for_deafness() -> None:
+    whys: list[str] = []
+    for seed in range(6):
+        field_ = Field(seed, radio=Carrier(loss=0.3, delay_s=0.1), lte=Carrier(loss=0.3, delay_s=0.1))
+        field_.run(60.0)
+        whys += [change.why for _, change in field_.changes]
+    assert sum("unanswered" in why for why in whys) <= 1, "in six minutes"
+
+
+def test_behind_a_router_each_way_takes_its_own_answer() -> None:
+    field_ = Field(wifi=Carrier(delay_s=0.01), radio=Carrier(hz=5.0, delay_s=0.4), routed=True)
+    field_.run(8.0)
+    wifi, radio = field_.ways.status(field_.now_s)
+    assert wifi.round_trip_s == pytest.approx(0.02, abs=2 * TICK_S)
+    assert radio.round_trip_s == pytest.approx(0.8, abs=2 * TICK_S)
+    assert radio.identity == "known"
 
 
 def test_what_is_shown_of_a_way() -> None:

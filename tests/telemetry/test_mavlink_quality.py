@@ -71,6 +71,20 @@ def test_an_answer_that_takes_longer_than_the_next_question_is_still_measured() 
     assert clock.on_message(heard(mavlink.MAVLink_timesync_message(9, late.ts1)), 1000.0) is None
 
 
+def test_answers_are_counted_against_questions_that_are_due() -> None:
+    clock = RoundTripClock(number=3)
+    assert (clock.share(100.0), clock.unanswered(100.0)) == (None, 0)
+    questions = [clock.ask(100.0 + k) for k in range(6)]
+    assert (clock.share(100.5), clock.unanswered(105.5)) == (None, 5)
+    other = heard(mavlink.MAVLink_timesync_message(9, questions[3].ts1 - 1))
+    assert clock.on_message(other, 103.2) is None, "of another way"
+    answer = heard(mavlink.MAVLink_timesync_message(9, questions[3].ts1))
+    assert clock.on_message(answer, 103.2) is not None
+    assert (clock.share(105.5), clock.unanswered(105.5)) == (pytest.approx(1 / 5), 1)
+    clock.forget_unanswered()
+    assert (clock.share(110.0), clock.unanswered(110.0), clock.round_trip_s) == (1.0, 0, pytest.approx(0.2))
+
+
 def test_the_rate_is_what_really_happened() -> None:
     meter = RateMeter()
     for k in range(11):

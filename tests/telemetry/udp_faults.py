@@ -1,4 +1,4 @@
-"""A proxy between a ground station and a vehicle on UDP that loses and delays datagrams, each way, or is cut."""
+"""A proxy between a ground station and a vehicle on UDP: it loses and delays datagrams, or is cut, one way or both."""
 
 from __future__ import annotations
 
@@ -24,7 +24,8 @@ class Proxy:
     def __init__(self, vehicle_port: int, loss: float, seed: int, delay_s: float) -> None:
         self._vehicle: Address = ("127.0.0.1", vehicle_port)
         self._random, self.loss, self.lost, self.carried = random.Random(seed), loss, 0, 0
-        self.delay_s, self.is_cut = delay_s, False
+        self.delay_s, self.is_cut, self.is_deaf = delay_s, False, False
+        """``is_deaf``: nothing reaches the vehicle any more."""
         self._near, self._far = _Side(self), _Side(self)
         self._station: Address | None = None
         self.port = 0
@@ -44,7 +45,7 @@ class Proxy:
     def on_datagram(self, side: _Side, data: bytes, addr: Address) -> None:
         if side is self._near:
             self._station = addr
-        if self.is_cut or self._random.random() < self.loss:
+        if self.is_cut or (self.is_deaf and side is self._near) or self._random.random() < self.loss:
             self.lost += 1
             return
         self.carried += 1

@@ -13,8 +13,12 @@ WINDOW_S = 5.0
 LARGEST_GAP = 100
 """A larger step of the 8-bit sequence number is a restart or a packet out of order, not a loss."""
 ROUND_TRIP_LIMIT_S = 10.0
-MOST_QUESTIONS = 12
+MOST_QUESTIONS = 20
 """That may still be answered."""
+COUNTED = 8
+"""Answers are counted against so many questions."""
+DUE_S, DUE_LIMIT_S = 1.0, 5.0
+"""A question counts as unanswered after twice the last round trip, within these."""
 
 
 class SequenceQuality:
@@ -57,10 +61,18 @@ class Reading:
 
 
 class RoundTripClock:
-    """Asks with TIMESYNC and measures how long the answer takes, and what time it is on board."""
+    """Asks with TIMESYNC and measures how long the answer takes, and what time it is on board.
 
-    def __init__(self) -> None:
+    Behind a router on board the answer comes over every way: ``number``, of this way alone, stands in its questions as
+    nanoseconds, and tells its own answers from the others'.
+    """
+
+    def __init__(self, number: int = 0) -> None:
+        self._number = number
         self.round_trip_s: float | None = None
+        self.answered_s = float("-inf")
+        """When the last answer came."""
+        self._answered_ns = 0
         self._asked: dict[int, Reading | None] = {}
 
     def ask(self, now_s: float) -> Message:
@@ -68,23 +80,47 @@ class RoundTripClock:
         self._asked[asked_ns] = None
         if len(self._asked) > MOST_QUESTIONS:
             del self._asked[next(iter(self._asked))]
-        return mavlink.MAVLink_timesync_message(0, asked_ns)
+        return mavlink.MAVLink_timesync_message(0, asked_ns + self._number)
 
     def reading(self, asked_ns: int) -> Reading | None:
         return self._asked.get(asked_ns)
+
+    def share(self, now_s: float) -> float | None:
+        """Of the last questions that were answered; None while that cannot be told."""
+        outcomes = self._outcomes(now_s)[-COUNTED:]
+        return sum(outcomes) / len(outcomes) if outcomes else None
+
+    def unanswered(self, now_s: float) -> int:
+        """So many in a row, up to now."""
+        outcomes = self._outcomes(now_s)
+        return len(outcomes) if True not in outcomes else outcomes[::-1].index(True)
+
+    def answered_beyond(self, other: RoundTripClock) -> int:
+        """Answers to questions that were asked after the last one that the other one has an answer to."""
+        return sum(each is not None and each.asked_ns > other._answered_ns for each in self._asked.values())
+
+    def forget_unanswered(self) -> None:
+        """Nothing could be heard: what did not come says nothing of what went out."""
+        self._asked = {asked_ns: reading for asked_ns, reading in self._asked.items() if reading is not None}
+
+    def _outcomes(self, now_s: float) -> list[bool]:
+        """Whether each question was answered, the oldest first, without those that well may be yet."""
+        due_s = now_s - min(max(DUE_S, 2 * (self.round_trip_s or 0.0)), DUE_LIMIT_S)
+        return [each is not None for at, each in self._asked.items() if each is not None or at / 1e9 < due_s]
 
     def on_message(self, message: Message, now_s: float) -> Reading | None:
         """The first answer to a question of ours."""
         if message.get_type() != "TIMESYNC" or message.tc1 == 0:
             return None
-        asked_ns = message.ts1
+        asked_ns = message.ts1 - self._number
         if asked_ns not in self._asked or self._asked[asked_ns] is not None:
             return None
         asked_s = asked_ns / 1e9
         taken_s = max(now_s - asked_s, 0.0)
         if taken_s >= ROUND_TRIP_LIMIT_S:
             return None
-        self.round_trip_s = taken_s
+        self.round_trip_s, self.answered_s = taken_s, now_s
+        self._answered_ns = max(asked_ns, self._answered_ns)
         self._asked[asked_ns] = reading = Reading(asked_ns, taken_s, message.tc1 / 1e9 - asked_s - taken_s / 2)
         return reading
 

@@ -20,6 +20,11 @@ MISSED = 4.0
 RESEND_S = 0.7
 """What the cost of a loss is counted with: an order that was lost goes out again so much later."""
 LEAST_SHARE = 0.05
+SHARE_SLACK = 0.2
+"""The share of so few answers is wrong by so much."""
+UNANSWERED, MOST_UNANSWERED, CHANCE = 3, 15, 0.005
+"""A way that brings messages is deaf after so many questions in a row without an answer: the fewest, the most, and how
+likely it may be that losses explain them, twice as many there as here."""
 SLACK_S = 0.1
 """Between two clocks of one vehicle, beyond what the round trips explain."""
 TELLS_S = 1.5
@@ -34,11 +39,11 @@ SIGNAL_S = 10.0
 class Way:
     """``identity`` "asked": by its numbers it is the vehicle, by its clock it is not known yet to be."""
 
-    def __init__(self, candidate: Candidate, *, identity: WayIdentity) -> None:
+    def __init__(self, candidate: Candidate, *, identity: WayIdentity, number: int = 0) -> None:
         self.candidate = candidate
         self.identity: WayIdentity = identity
         self.heard_s = float("-inf")
-        self.quality, self.clock = SequenceQuality(), RoundTripClock()
+        self.quality, self.clock = SequenceQuality(), RoundTripClock(number)
         self._signal: tuple[RadioSignal, float] | None = None
         self._place: tuple[tuple[float, float], float] | None = None
         self._agreed = self._differed = 0
@@ -49,6 +54,8 @@ class Way:
 
     def hear(self, message: Message, now_s: float) -> Reading | None:
         """A message of the vehicle's autopilot that came over this way."""
+        if self.is_silent(now_s):
+            self.clock.forget_unanswered()
         self.heard_s = now_s
         self.quality.hear(message.get_seq(), now_s)
         if message.get_type() == "GLOBAL_POSITION_INT":
@@ -74,16 +81,28 @@ class Way:
         limit_s = STALE_S if hz == 0 else min(max(SILENT_S, MISSED / hz), STALE_S)
         return self.silent_s(now_s) > limit_s
 
+    def is_deaf(self, now_s: float) -> bool:
+        """The vehicle does not hear what goes out over it: its answers are missing, whatever else comes."""
+        missing, share = self.clock.unanswered(now_s), self.quality.share(now_s)
+        by_chance = 0.0 if share is None else (1 - share**3) ** missing
+        return missing >= MOST_UNANSWERED or (missing >= UNANSWERED and by_chance < CHANCE)
+
+    def round_trip_s(self, now_s: float) -> float | None:
+        """None also when answers are missing: what was measured before says nothing any more."""
+        return None if self.is_deaf(now_s) else self.clock.round_trip_s
+
     def is_ready(self, now_s: float) -> bool:
         """It may be used."""
         return self.identity == "known" and not self.is_silent(now_s)
 
     def cost_s(self, now_s: float) -> float:
         """How long an order takes until it is answered, the repetitions of what is lost either way in it."""
-        share, round_trip_s = self.quality.share(now_s), self.clock.round_trip_s
+        share, round_trip_s = self.quality.share(now_s), self.round_trip_s(now_s)
         if share is None or round_trip_s is None:
             return float("inf")
-        return round_trip_s + RESEND_S * (1 / max(share, LEAST_SHARE) ** 2 - 1)
+        answered = self.clock.share(now_s)
+        both = share**2 if answered is None else min(share**2, answered + SHARE_SLACK)
+        return round_trip_s + RESEND_S * (1 / max(both, LEAST_SHARE**2) - 1)
 
     def judge(self, witness: Way, asked_ns: int, now_s: float) -> None:
         """Held against one that is known to be the vehicle's, by the question that both were asked at once."""
@@ -120,6 +139,6 @@ class Way:
             in_use=in_use,
             silent_s=None if self.heard_s == float("-inf") else self.silent_s(now_s),
             quality=self.quality.share(now_s),
-            round_trip_s=self.clock.round_trip_s,
+            round_trip_s=self.round_trip_s(now_s),
             signal=signal[0] if signal is not None and now_s - signal[1] < SIGNAL_S else None,
         )

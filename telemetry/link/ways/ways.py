@@ -1,6 +1,7 @@
 """All ways to the adopted vehicle, and the one in use: orders go over it alone, and the vehicle's state comes from it.
 
-Another one takes over at once when the one in use falls silent; while it does not, only one that has been clearly
+Another one takes over at once when the one in use falls silent, or when the vehicle answers over the other one and no
+more over the one in use; while neither is so, only one that has been clearly
 better without a break for ``SETTLE_S``. A way is used when its vehicle is known to be the adopted one. No clock of its
 own: ``now_s`` is monotonic.
 """
@@ -9,9 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import count
 
 from telemetry.link.ways.copies import ANSWERS, Copies
-from telemetry.link.ways.way import Way
+from telemetry.link.ways.way import UNANSWERED, Way
 from telemetry.mavlink.actions import Message
 from telemetry.topics.link_ways import WayStatus
 from telemetry.topics.messages import LOST_S, Candidate
@@ -30,12 +32,13 @@ class ChangeOver:
     why: str
     """Words that follow a colon."""
     is_loss: bool
-    """The way before is silent or gone; False: it is only worse."""
+    """The way before is silent, deaf or gone; False: it is only worse."""
 
 
 class Ways:
     def __init__(self, candidate: Candidate, now_s: float) -> None:
         """``candidate``: the vehicle, where it was adopted."""
+        self._numbers = count(1)
         self.chosen = Way(candidate, identity="known")
         self.chosen.heard_s = now_s
         self._ways = {candidate.address: self.chosen}
@@ -61,7 +64,7 @@ class Ways:
     def add(self, candidate: Candidate) -> None:
         """Who has the vehicle's numbers there; until its clock has been compared nothing of it is used."""
         if candidate.address != self.chosen.address:
-            self._ways[candidate.address] = Way(candidate, identity="asked")
+            self._ways[candidate.address] = Way(candidate, identity="asked", number=next(self._numbers))
 
     def remove(self, address: str, now_s: float) -> ChangeOver | None:
         """Not the last one that is known."""
@@ -111,16 +114,20 @@ class Ways:
 
     def choose(self, now_s: float) -> ChangeOver | None:
         """Looked at on every tick."""
+        is_silent = self.chosen.is_silent(now_s)
         ready = [way for way in self if way is not self.chosen and way.is_ready(now_s)]
-        if self.chosen.is_silent(now_s):
+        if is_silent:
             # Heard later than the one in use: when all fall silent nothing goes back and forth.
             ready = [way for way in ready if way.heard_s > self.chosen.heard_s]
-        if not ready:
+        best = min(ready, key=lambda way: way.cost_s(now_s), default=None)
+        if best is None:
             self._better = None
             return None
-        best = min(ready, key=lambda way: way.cost_s(now_s))
-        if self.chosen.is_silent(now_s):
+        if is_silent:
             return self._change(best, _silence(self.chosen.silent_s(now_s)), is_loss=True)
+        # A vehicle that answers over no way is one that does not know the question.
+        if self.chosen.is_deaf(now_s) and best.clock.answered_beyond(self.chosen.clock) >= UNANSWERED:
+            return self._change(best, f"{self.chosen.clock.unanswered(now_s)} questions went unanswered", is_loss=True)
         return self._settle(best, now_s)
 
     def _settle(self, best: Way, now_s: float) -> ChangeOver | None:
@@ -153,6 +160,6 @@ def _worse(before: Way, now: Way, now_s: float) -> str:
 
 
 def _figures(way: Way, now_s: float) -> str:
-    share, round_trip_s = way.quality.share(now_s), way.clock.round_trip_s
+    share, round_trip_s = way.quality.share(now_s), way.round_trip_s(now_s)
     loss = "nothing heard" if share is None else f"{100 * (1 - share):.0f} % lost"
     return loss if round_trip_s is None else f"{loss} and {1000 * round_trip_s:.0f} ms"
