@@ -138,6 +138,7 @@ class AdoptedVehicle:
 
     def part_ways(self) -> list[Way]:
         """Those that turned out to lead to another vehicle, or that nobody can tell of."""
+        self.ways.lapse(self._clock())
         parted = self.ways.part(self._clock())
         for way in parted:
             del self._lines[way.address]

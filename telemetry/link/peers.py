@@ -143,9 +143,9 @@ class Peers:
         """It may be the adopted vehicle, reached another way."""
         self._places[candidate.address] = _Place(candidate, now_s, now_s, is_known=False)
 
-    def know(self, address: str) -> None:
-        """It is."""
-        self._places[address].is_known = True
+    def know(self, address: str, *, is_known: bool = True) -> None:
+        """It is; or, after a long silence, that is asked anew."""
+        self._places[address].is_known = is_known
 
     def part(self, address: str, *, refused: bool) -> None:
         """It is not, or nobody can tell any more, or the connection is closed."""

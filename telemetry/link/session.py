@@ -143,8 +143,7 @@ class Session:
         for way in self.vehicle.part_ways():
             peers.part(way.address, refused=way.identity == "other")
         for way in self.vehicle.ways:
-            if way.identity == "known":
-                peers.know(way.address)
+            peers.know(way.address, is_known=way.identity == "known")
 
     def _on_believed(self, message: Message, now_s: float, t_utc_s: float) -> None:
         heading_rad = self.vehicle.state.heading_rad

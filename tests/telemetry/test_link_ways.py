@@ -84,6 +84,7 @@ class Field:
                 answer = mavlink.MAVLink_timesync_message(tc1, question.ts1)
                 for back in self.carriers.values() if self._routed else [carrier]:
                     self._send(back, answer, carrier.delay_s + back.delay_s)
+        self.ways.lapse(self.now_s)
         if (change := self.ways.choose(self.now_s)) is not None:
             self.changes.append((self.now_s, change))
 
@@ -141,6 +142,39 @@ def test_one_that_was_known_and_differs_from_now_on_is_parted_with() -> None:
     field_.carriers[LTE].boot_s = -10.0
     field_.run(6.0)
     assert [way.address for way in field_.ways.part(field_.now_s)] == [LTE]
+
+
+def test_who_comes_back_after_a_long_silence_is_compared_again_before_it_is_used() -> None:
+    field_ = Field(wifi=Carrier(), lte=Carrier())
+    field_.run(5.0)
+    carrier = field_.carriers[LTE]
+    carrier.cut = True
+    field_.run(LOST_S + 1.0)
+    carrier.cut, carrier.boot_s = False, -10.0
+    field_.run(1.0)
+    assert not field_.ways.is_known(LTE)
+    assert not field_.ways.takes(LTE, heard(heartbeat()), field_.now_s)
+    carrier.boot_s = -90.0
+    field_.run(5.0)
+    assert field_.ways.is_known(LTE)
+
+
+def test_one_that_took_over_after_its_own_silence_is_no_witness_against_the_one_before() -> None:
+    field_ = Field(wifi=Carrier(), lte=Carrier())
+    field_.run(5.0)
+    wifi, lte = field_.carriers[WIFI], field_.carriers[LTE]
+    wifi.cut = lte.cut = True
+    field_.run(LOST_S + 2.0)
+    lte.cut, lte.boot_s = False, -10.0
+    field_.run(2.0)
+    assert field_.used == LTE
+    wifi.cut = False
+    field_.run(10.0)
+    assert field_.ways.part(field_.now_s) == []
+    assert not field_.ways.is_known(WIFI), "which of the two is the vehicle is not known"
+    lte.boot_s = -90.0
+    field_.run(5.0)
+    assert field_.ways.is_known(WIFI)
 
 
 def test_a_restart_of_the_vehicle_parts_nothing() -> None:

@@ -11,7 +11,7 @@ from telemetry.link.ways.quality import Reading, RoundTripClock, SequenceQuality
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.reduce import lat_lon
 from telemetry.topics.link_ways import RadioSignal, WayIdentity, WayStatus
-from telemetry.topics.messages import STALE_S, Candidate
+from telemetry.topics.messages import LOST_S, STALE_S, Candidate
 
 SILENT_S = 0.7
 """A way that carries many messages is silent after this."""
@@ -43,6 +43,8 @@ class Way:
         self.candidate = candidate
         self.identity: WayIdentity = identity
         self.heard_s = float("-inf")
+        self.has_lapsed = False
+        """It was silent for so long that another one may have taken its place, and has not been compared since."""
         self.quality, self.clock = SequenceQuality(), RoundTripClock(number)
         self._signal: tuple[RadioSignal, float] | None = None
         self._place: tuple[tuple[float, float], float] | None = None
@@ -71,6 +73,9 @@ class Way:
     def gone(self) -> None:
         """The far end hung up: nothing is waited for."""
         self.heard_s = float("-inf")
+
+    def is_lost(self, now_s: float) -> bool:
+        return self.silent_s(now_s) > LOST_S
 
     def silent_s(self, now_s: float) -> float:
         return now_s - self.heard_s
@@ -104,16 +109,20 @@ class Way:
         both = share**2 if answered is None else min(share**2, answered + SHARE_SLACK)
         return round_trip_s + RESEND_S * (1 / max(both, LEAST_SHARE**2) - 1)
 
+    def doubt(self) -> None:
+        """It is asked anew, as one that was never known."""
+        self.identity, self._agreed, self._differed = "asked", 0, 0
+
     def judge(self, witness: Way, asked_ns: int, now_s: float) -> None:
         """Held against one that is known to be the vehicle's, by the question that both were asked at once."""
         same = self._is_same(witness, asked_ns, now_s)
         if same is None:
             return
         self._agreed, self._differed = (self._agreed + 1, 0) if same else (0, self._differed + 1)
-        if self._differed >= DIFFERS:
+        if self._differed >= DIFFERS and not witness.has_lapsed:
             self.identity = "other"
-        elif self._agreed >= AGREES and self.identity == "asked":
-            self.identity = "known"
+        elif self._agreed >= AGREES and self.identity != "other":
+            self.identity, self.has_lapsed, witness.has_lapsed = "known", False, False
 
     def _is_same(self, witness: Way, asked_ns: int, now_s: float) -> bool | None:
         ours, theirs = self.clock.reading(asked_ns), witness.clock.reading(asked_ns)

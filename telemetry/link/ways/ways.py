@@ -16,7 +16,7 @@ from telemetry.link.ways.copies import ANSWERS, Copies
 from telemetry.link.ways.way import UNANSWERED, Way
 from telemetry.mavlink.actions import Message
 from telemetry.topics.link_ways import WayStatus
-from telemetry.topics.messages import LOST_S, Candidate
+from telemetry.topics.messages import Candidate
 
 ASK_EVERY_S = 1.0
 SETTLE_S = 5.0
@@ -103,9 +103,17 @@ class Ways:
         self._asked_s = now_s
         return [(way, way.clock.ask(now_s)) for way in self]
 
+    def lapse(self, now_s: float) -> None:
+        """Who comes back after a long silence, or calls anew, is compared with the vehicle again while it is heard."""
+        for way in self:
+            if way is not self.chosen and way.is_lost(now_s):
+                way.has_lapsed = True
+                if way.identity == "known" and not self.chosen.is_lost(now_s):
+                    way.doubt()
+
     def part(self, now_s: float) -> list[Way]:
         """Ways that turned out to be another vehicle's, or that nothing can be compared with any more: taken out."""
-        lost = all(way.silent_s(now_s) > LOST_S for way in self if way.identity == "known")
+        lost = all(way.is_lost(now_s) for way in self if way.identity == "known")
         out = [way for way in self if way.identity == "other" or (way.identity == "asked" and lost)]
         out = [way for way in out if way is not self.chosen]
         for way in out:
