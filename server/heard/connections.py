@@ -9,6 +9,7 @@ from server.door.lease import Lease
 from server.errors import reported
 from server.heard.node_states import Nodes
 from telemetry.bus.link_client import LinkClient
+from telemetry.errors import NotAllowedError
 from telemetry.topics.messages import LinkStatus
 from telemetry.topics.requests import Adopt, Connect, Disconnect, Operator, Release, SetSigning
 
@@ -55,8 +56,14 @@ class Connections:
             await self.connect(operator, address, adopt=adopt, as_way=True)
 
     async def disconnect(self, operator: Operator, address: str) -> None:
-        self._wanted.pop(address, None)
-        await self._link.call(Disconnect(operator, address))
+        """Raises NotAllowedError: there is none, or the vehicle needs it."""
+        wish = self._wanted.pop(address, None)
+        try:
+            await self._link.call(Disconnect(operator, address))
+        except NotAllowedError:
+            if wish is not None and self.holds(address):
+                self._wanted[address] = wish
+            raise
 
     def holds(self, address: str) -> bool:
         """The link node has told so."""
@@ -81,6 +88,7 @@ class Connections:
         # Otherwise a link node that is started again would adopt what was just let go of.
         self._wanted = {address: replace(wish, adopt=False) for address, wish in self._wanted.items()}
         await self._link.call(Release(operator))
+        self._candidate = None  # a status from before may have come meanwhile
 
     async def on_status(self, status: LinkStatus) -> None:
         """What the node holds is taken over from a server before; what it lacks is asked for again."""

@@ -9,7 +9,7 @@ from typing import Any, cast
 import pytest
 
 from server.heard.connections import Connections
-from telemetry.errors import AddressError, ConnectionFailedError
+from telemetry.errors import AddressError, ConnectionFailedError, NotAllowedError
 from telemetry.topics.messages import Candidate, ConnectionStatus, LinkStatus
 from telemetry.topics.requests import Adopt, Connect, Disconnect, Operator, Release
 
@@ -92,6 +92,39 @@ def test_what_was_let_go_of_stays_so() -> None:
         await wanted.on_status(status(UDP, TCP, candidates=(QUAD,)))
         await wanted.on_status(status(UDP, candidates=(QUAD,)))
         assert link.asked == []
+
+    asyncio.run(scenario())
+
+
+def test_a_connection_that_the_vehicle_needs_stays_wanted() -> None:
+    async def scenario() -> None:
+        link = Link()
+        link.failing[Disconnect] = NotAllowedError("The vehicle may be flying.")
+        wanted = connections(link, UDP)
+        await wanted.on_status(status(UDP, adopted=QUAD))
+        for address in (UDP, TCP):
+            with pytest.raises(NotAllowedError):
+                await wanted.disconnect(ME, address)
+        assert wanted.wanted == [UDP]
+
+    asyncio.run(scenario())
+
+
+def test_a_status_from_before_a_release_adopts_nothing_again() -> None:
+    class Slow(Link):
+        async def call(self, request: Any) -> None:
+            await super().call(request)
+            if isinstance(request, Release):
+                await wanted.on_status(status(UDP, adopted=QUAD))
+
+    link = Slow()
+    wanted = connections(link, UDP)
+
+    async def scenario() -> None:
+        await wanted.on_status(status(UDP, adopted=QUAD))
+        await wanted.release(ME)
+        await wanted.on_status(status(UDP, candidates=(QUAD,)))
+        assert link.asked == [Release(ME)]
 
     asyncio.run(scenario())
 
