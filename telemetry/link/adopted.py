@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, cast
 
 from planning.basics.plan_model import Firmware
-from telemetry.errors import RefusedError, SilentError
+from telemetry.errors import NotAllowedError, RefusedError, SilentError
 from telemetry.link.exchanges import Exchanges
 from telemetry.link.heartbeat import heartbeat
 from telemetry.link.line import Line
@@ -116,6 +116,11 @@ class AdoptedVehicle:
     def round_trip_s(self) -> float | None:
         return self.ways.chosen.round_trip_s(self._clock())
 
+    @property
+    def may_fly(self) -> bool:
+        """It is not known to be disarmed."""
+        return self.state.heartbeat_t_mono_s is None or self.state.armed
+
     def moved(self, candidate: Candidate, line: Line) -> None:
         """It sends from another port now, as the operator says."""
         self.candidate = candidate
@@ -145,17 +150,34 @@ class AdoptedVehicle:
         return parted
 
     def leave_way(self, address: str) -> bool:
-        """The connection is taken away. False: no other one leads to the vehicle."""
-        if self.ways.get(address) is None:
+        """The connection is taken away. False: no other one leads to the vehicle. Raises NotAllowedError for the last
+        one over which a vehicle is heard that may fly.
+        """
+        way, now_s = self.ways.get(address), self._clock()
+        if way is None:
             return True
-        if not self.ways.has_other_known(address):
+        if (
+            way is self.ways.chosen
+            and not self.ways.has_other_live(address, now_s)
+            and not self._may_be_left(way, now_s)
+        ):
             return False
-        now_s = self._clock()
         change = self.ways.remove(address, now_s)
         if change is not None:
             self._change_over(change, now_s)
         del self._lines[address]
+        if self.candidate.address == address:
+            self.candidate = self.ways.chosen.candidate
         return True
+
+    def _may_be_left(self, way: Way, now_s: float) -> bool:
+        """When all others are silent."""
+        if way.is_lost(now_s):
+            return self.ways.has_other_known(way.address)
+        if self.may_fly and self.ways.was_reached_beside(way.address):
+            what = f"The vehicle may be flying, and it is heard over {way.address} alone: the other ways are silent."
+            raise NotAllowedError(what, advice="Land and disarm it, or release it first.")
+        return False
 
     def send_first(self) -> None:
         """A heartbeat at once: some vehicles answer nobody whose heartbeat they have not heard."""

@@ -144,8 +144,7 @@ class Answering:
 
     async def _adopt(self, request: requests.Adopt) -> None:
         candidate = self._link.peers.find(request.candidate, time.monotonic())
-        adopted = self._link.peers.adopted
-        if adopted is not None and adopted.id == request.candidate:
+        if request.candidate in [place.id for place in self._link.peers.places]:
             return
         if candidate is None:
             what = f"{request.candidate!r} is not heard at the moment."

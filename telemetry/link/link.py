@@ -110,7 +110,7 @@ class Link:
         self._tell()
 
     def adopt(self, candidate: Candidate) -> None:
-        if self.session is not None and self.session.vehicle.candidate == candidate:
+        if candidate in self.peers.places:
             return
         if self.session is not None and candidate == self.peers.again(time.monotonic()):
             self._go_on_from(self.session, candidate)
@@ -162,8 +162,7 @@ class Link:
         """The adopted vehicle, or the one that is waited for, is not known to be disarmed."""
         if self.session is None:
             return self._expected is None or self._expected.may_fly
-        state = self.session.vehicle.state
-        return state.heartbeat_t_mono_s is None or state.armed
+        return self.session.vehicle.may_fly
 
     @property
     def started(self) -> Started:

@@ -141,6 +141,8 @@ class Peers:
 
     def ask(self, candidate: Candidate, now_s: float) -> None:
         """It may be the adopted vehicle, reached another way."""
+        if self._imposter is not None and self._imposter[0].id == candidate.id:
+            self._imposter = None
         self._places[candidate.address] = _Place(candidate, now_s, now_s, is_known=False)
 
     def know(self, address: str, *, is_known: bool = True) -> None:
@@ -155,8 +157,7 @@ class Peers:
 
     def release(self) -> None:
         """Also forgets the wish to adopt by itself: the operator has just said no."""
-        for address in self._places:
-            self._adopt_first.pop(address, None)
+        self._adopt_first.clear()
         self.adopted, self._imposter, self._places = None, None, {}
 
     def gone(self, address: str, peer: Peer) -> bool:
@@ -172,6 +173,8 @@ class Peers:
         self._adopt_first.pop(address, None)
         self._as_way.discard(address)
         self._places.pop(address, None)
+        if self.adopted is not None and self.adopted.address == address:
+            self.adopted = next(iter(self.places), self.adopted)
         self._refused = {refused for refused in self._refused if not refused.startswith(f"{address}/")}
         self._heard = {source: seen for source, seen in self._heard.items() if source.address != address}
 

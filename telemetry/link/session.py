@@ -135,7 +135,7 @@ class Session:
         if self.signs or way.identity != "known":
             return
         vehicle.on_foreign(message)  # a vehicle that demands signatures does not listen to it
-        if way is vehicle.ways.chosen:
+        if vehicle.ways.is_prompt(address, now_s):
             self.traffic.on_message(message, vehicle.state, now_s)
 
     def settle_ways(self, peers: Peers) -> None:

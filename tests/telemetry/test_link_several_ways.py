@@ -10,8 +10,10 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from telemetry.errors import NotAllowedError
 from telemetry.link.answering import OperatorRight
 from telemetry.link.ways.ways import SETTLE_S
 from telemetry.nodes.link import LinkNode, Memory, Wanted, read_memory
@@ -19,7 +21,7 @@ from telemetry.simulation.simulator.autopilot.flight_modes import Hold
 from telemetry.simulation.simulator.run import SimOptions, Simulator, flying
 from telemetry.topics.link_ways import WayStatus
 from telemetry.topics.messages import Candidate, RawFrame
-from telemetry.topics.requests import Arm, Connect, Disarm, Disconnect, Pause, Resume, SetSigning, StartAuto
+from telemetry.topics.requests import Adopt, Arm, Connect, Disarm, Disconnect, Pause, Resume, SetSigning, StartAuto
 from tests.telemetry.bus_runs import run
 from tests.telemetry.fake_vehicle import UdpVehicle
 from tests.telemetry.link_bench import ME, Console, console, free_port, until
@@ -61,6 +63,11 @@ def at(proxy: Proxy) -> str:
 
 def way(bench: Console, address: str) -> WayStatus | None:
     return next((each for each in bench.status.ways if each.address == address), None)
+
+
+def identity(bench: Console, address: str) -> str | None:
+    found = way(bench, address)
+    return None if found is None else found.identity
 
 
 def used(bench: Console) -> str:
@@ -188,16 +195,48 @@ def test_the_way_in_use_can_be_taken_away_and_a_new_one_added_and_the_last_one_r
             console() as bench,
         ):
             await reached(bench, at(one), at(other))
-            adopted = bench.status.adopted
             await bench.handle(Disconnect(ME, at(one)))
-            assert (used(bench), bench.status.adopted, bench.status.state) == (at(other), adopted, "live")
+            there = bench.status.adopted
+            assert there is not None
+            assert (used(bench), there.address, bench.status.state) == (at(other), at(other), "live")
             await bench.handle(Connect(ME, at(one), as_way=True))
             await until(lambda: [each.identity for each in bench.status.ways] == ["known", "known"])
             assert used(bench) == at(other)
             await bench.handle(Disconnect(ME, at(one)))
-            assert bench.status.adopted == adopted
+            assert bench.status.adopted == there
             await bench.handle(Disconnect(ME, at(other)))
             assert (bench.status.adopted, bench.status.ways) == (None, ())
+
+    run(whole)
+
+
+def test_the_last_way_over_which_a_vehicle_is_heard_stays_while_it_may_fly_and_it_is_found_again_where_it_was() -> None:
+    async def whole() -> None:
+        async with (
+            vehicle(speedup=1.0) as (_, port),
+            lossy_udp(port, loss=0.0) as one,
+            lossy_udp(port, loss=0.0) as other,
+            console() as bench,
+        ):
+            await reached(bench, at(one), at(other))
+            await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
+            await bench.handle(Arm(ME))
+            await until(lambda: bench.state.armed)
+            other.is_cut = True
+            await until(lambda: identity(bench, at(other)) == "asked", 10.0)
+            with pytest.raises(NotAllowedError, match="the other ways are silent"):
+                await bench.handle(Disconnect(ME, at(one)))
+            assert (used(bench), bench.status.state) == (at(one), "live")
+            other.is_cut = False
+            await until(lambda: identity(bench, at(other)) == "known", 10.0)
+            await bench.handle(Disconnect(ME, at(one)))
+            other.is_cut = True
+            await until(lambda: bench.status.state == "lost", 10.0)
+            await bench.handle(Connect(ME, at(one), as_way=True))
+            await until(lambda: bench.status.again is not None)
+            assert bench.status.again is not None
+            await bench.handle(Adopt(ME, bench.status.again.id))
+            await until(lambda: (used(bench), bench.status.state) == (at(one), "live"))
 
     run(whole)
 

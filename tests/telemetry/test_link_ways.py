@@ -295,7 +295,7 @@ def test_who_hangs_up_is_not_waited_for() -> None:
 def test_the_one_in_use_can_be_taken_away_in_flight() -> None:
     field_ = Field(wifi=Carrier(), lte=Carrier())
     field_.run(5.0)
-    assert field_.ways.has_other_known(WIFI)
+    assert field_.ways.has_other_live(WIFI, field_.now_s)
     change = field_.ways.remove(WIFI, field_.now_s)
     assert change is not None
     assert (field_.used, change.why) == (LTE, "it was taken away")
@@ -315,6 +315,24 @@ def test_state_comes_from_the_way_in_use_and_answers_from_all_once() -> None:
     assert takes(WIFI, ack, field_.now_s), "it was said a second time"
     assert not takes(LTE, ack, field_.now_s)
     assert not takes("udpin:0.0.0.0:1", ack, field_.now_s)
+
+
+def test_what_a_stalled_way_held_back_is_not_taken_for_something_new() -> None:
+    field_ = Field(wifi=Carrier(), lte=Carrier())
+    field_.run(5.0)
+    carrier, said = field_.carriers[LTE], heard(mavlink.MAVLink_mission_ack_message(255, 190, 0))
+    carrier.delay_s = 4.0
+    field_.run(4.0)
+    assert not field_.ways.takes(LTE, said, field_.now_s)
+    assert field_.ways.takes(WIFI, said, field_.now_s)
+    field_.run(10.0)
+    assert not field_.ways.takes(LTE, said, field_.now_s), "its answers come, but late"
+    carrier.delay_s = 0.1
+    carrier.underway.clear()
+    field_.run(3.0)
+    assert field_.ways.is_known(LTE)
+    other = heard(mavlink.MAVLink_mission_ack_message(255, 190, 1))
+    assert field_.ways.takes(LTE, other, field_.now_s)
 
 
 def test_with_one_way_everything_counts() -> None:

@@ -189,6 +189,7 @@ def test_only_on_a_connection_that_is_named_as_a_way_may_its_numbers_be_the_vehi
 def test_who_is_asked_is_neither_vehicle_nor_imposter_until_it_is_known() -> None:
     peers = with_a_way()
     candidate = asked(peers, THERE, 0.1)
+    assert peers.warnings(0.2) == (), "no second vehicle"
     assert peers.hear(THERE, heard(attitude()), 0.2) == "asked"
     assert (peers.places, peers.place_at(TCP)) == ((peers.adopted,), candidate)
     peers.know(TCP)
@@ -247,12 +248,22 @@ def test_while_one_way_is_heard_nobody_is_asked_whether_that_is_it() -> None:
     assert peers.again(0.3) is not None
 
 
+def test_when_the_connection_goes_where_it_was_adopted_it_is_the_one_at_the_next_place() -> None:
+    peers = with_a_way()
+    candidate = asked(peers, THERE, 0.1)
+    peers.know(TCP)
+    peers.forget(UDP)
+    assert (peers.adopted, peers.places) == (candidate, (candidate,))
+
+
 def test_a_release_forgets_all_places() -> None:
     peers = with_a_way()
-    peers.adopt_first_of(TCP, wanted=True)
+    for address in (TCP, "tcp:10.0.0.9:5760"):
+        peers.adopt_first_of(address, wanted=True)
     asked(peers, THERE, 0.1)
     peers.know(TCP)
     peers.release()
+    assert not peers.adopts_first_of("tcp:10.0.0.9:5760"), "nobody was heard there yet"
     assert (peers.places, peers.adopted) == ((), None)
     assert not peers.wants(THERE, heard(heartbeat()))
     assert not peers.may_join(THERE, heard(heartbeat()), 0.2)

@@ -30,7 +30,7 @@ ANSWERS = frozenset(
         "STATUSTEXT",
     }
 )
-"""Taken from every way; whatever tells the vehicle's state is taken from the one in use alone."""
+"""Taken from every way that holds nothing back; what tells the vehicle's state from the one in use alone."""
 KEEP_S = 10.0
 """A slow way brings its copy later than this at worst as an answer to something that is over."""
 MOST = 2048

@@ -34,6 +34,8 @@ AGREES, DIFFERS = 2, 3
 FAR_M, FRESH_S = 300.0, 2.0
 """No vehicle is in two places so far apart within the time that both are fresh."""
 SIGNAL_S = 10.0
+PROMPT_S = 2.0
+"""What a spare way brings counts while its last answer is younger than this, and took no longer."""
 
 
 class Way:
@@ -91,6 +93,11 @@ class Way:
         missing, share = self.clock.unanswered(now_s), self.quality.share(now_s)
         by_chance = 0.0 if share is None else (1 - share**3) ** missing
         return missing >= MOST_UNANSWERED or (missing >= UNANSWERED and by_chance < CHANCE)
+
+    def is_prompt(self, now_s: float) -> bool:
+        """False: it may be bringing what it held back. That would be taken for something new."""
+        took_s = self.clock.round_trip_s
+        return took_s is not None and took_s < PROMPT_S and now_s - self.clock.answered_s <= PROMPT_S
 
     def round_trip_s(self, now_s: float) -> float | None:
         """None also when answers are missing: what was measured before says nothing any more."""

@@ -61,6 +61,11 @@ class Ways:
         way = self._ways.get(address)
         return way is not None and way.identity == "known"
 
+    def is_prompt(self, address: str, now_s: float) -> bool:
+        """What comes over it is of now: it is in use, or a known one that holds nothing back."""
+        way = self._ways.get(address)
+        return way is self.chosen or (way is not None and way.identity == "known" and way.is_prompt(now_s))
+
     def add(self, candidate: Candidate) -> None:
         """Who has the vehicle's numbers there; until its clock has been compared nothing of it is used."""
         if candidate.address != self.chosen.address:
@@ -74,12 +79,21 @@ class Ways:
         known = [way for way in self if way.identity == "known"]
         return self._change(min(known, key=lambda way: way.silent_s(now_s)), "it was taken away", is_loss=True)
 
+    def has_other_live(self, address: str, now_s: float) -> bool:
+        """A known one, beside the one at this address."""
+        others = (way for way in self if way.address != address and way.identity == "known")
+        return any(not way.is_lost(now_s) for way in others)
+
     def has_other_known(self, address: str) -> bool:
         return any(way.identity == "known" for way in self if way.address != address)
 
+    def was_reached_beside(self, address: str) -> bool:
+        """Another way was known once, and may come back."""
+        return any(way.identity == "known" or way.has_lapsed for way in self if way.address != address)
+
     def takes(self, address: str, message: Message, now_s: float) -> bool:
         """Whether anything is to be made of this message. To be asked once for each."""
-        if not self.is_known(address):
+        if not self.is_prompt(address, now_s):
             return False
         if self.has_several and message.get_type() in ANSWERS:
             return self._copies.is_new(address, message, now_s)
