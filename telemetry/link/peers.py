@@ -26,6 +26,8 @@ FORGET_S = 10.0
 MOST_CANDIDATES = 32
 TRY_S = 10.0
 """Who is asked for longer than this on a way makes room for the next one with the same numbers."""
+REFUSED_S = 60.0
+"""Who was another vehicle on a way is asked again after this: its id tells no vehicles apart."""
 WARN_S = 5.0
 """How long a second vehicle with the same numbers is warned of after it was last heard."""
 
@@ -43,7 +45,11 @@ class Source:
 
     @property
     def id(self) -> str:
-        return f"{self.address}/{self.peer}/{self.system_id}/{self.component_id}"
+        return f"{self.way}/{self.system_id}/{self.component_id}"
+
+    @property
+    def way(self) -> str:
+        return f"{self.address}/{self.peer}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +99,8 @@ class Peers:
         self._imposter: tuple[Source, float] | None = None
         self._adopt_first: dict[str, Candidate | None] = {}
         self._as_way: set[str] = set()
-        self._refused: set[str] = set()
-        """Ids of those on such connections that turned out to be another vehicle."""
+        self._refused: dict[str, float] = {}
+        """Ids of those on such connections that turned out to be another vehicle, and when they did."""
 
     def adopt_first_of(self, address: str, *, wanted: bool, only: Candidate | None = None) -> None:
         """The first autopilot heard on this connection becomes the vehicle, if none is by then.
@@ -149,11 +155,12 @@ class Peers:
         """It is; or, after a long silence, that is asked anew."""
         self._places[address].is_known = is_known
 
-    def part(self, address: str, *, refused: bool) -> None:
+    def part(self, address: str, now_s: float, *, refused: bool) -> None:
         """It is not, or nobody can tell any more, or the connection is closed."""
         place = self._places.pop(address, None)
+        self._refused = {each: since_s for each, since_s in self._refused.items() if now_s - since_s < REFUSED_S}
         if place is not None and refused:
-            self._refused.add(place.candidate.id)
+            self._refused[place.candidate.id] = now_s
 
     def release(self) -> None:
         """Also forgets the wish to adopt by itself: the operator has just said no."""
@@ -175,7 +182,7 @@ class Peers:
         self._places.pop(address, None)
         if self.adopted is not None and self.adopted.address == address:
             self.adopted = next(iter(self.places), self.adopted)
-        self._refused = {refused for refused in self._refused if not refused.startswith(f"{address}/")}
+        self._refused = {each: at_s for each, at_s in self._refused.items() if not each.startswith(f"{address}/")}
         self._heard = {source: seen for source, seen in self._heard.items() if source.address != address}
 
     def hear(self, source: Source, message: Message, now_s: float) -> Verdict:
@@ -207,7 +214,8 @@ class Peers:
             return False
         others = (place for address, place in self._places.items() if address != source.address)
         is_heard = any(place.is_known and not place.is_lost(now_s) for place in others)
-        return is_heard and source.id not in self._refused and _is_kind_of(adopted, source, message)
+        is_refused = now_s - self._refused.get(source.id, -REFUSED_S) < REFUSED_S
+        return is_heard and not is_refused and _is_kind_of(adopted, source, message)
 
     def again(self, now_s: float) -> Candidate | None:
         """Who may be the adopted vehicle, which has fallen silent or hung up, by the numbers. Operators decide."""

@@ -16,11 +16,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import SilentError, TelemetryError
 from telemetry.flight.home_watch import HomeWatch
-from telemetry.link.adopted import ALERT, AdoptedVehicle, Telling
+from telemetry.link.adopted import ALERT, WARNING, AdoptedVehicle, Telling
 from telemetry.link.audit import AUTOPILOT, CommandLog
 from telemetry.link.line import Line
 from telemetry.link.log_reading import LogReading
-from telemetry.link.peers import Peers
+from telemetry.link.peers import REFUSED_S, Peers
 from telemetry.link.piloting import Pilot
 from telemetry.link.procedures import Spawn
 from telemetry.link.publishing import StatePublisher
@@ -37,6 +37,10 @@ from telemetry.topics.vehicle import VehicleState
 from telemetry.traffic.picture import TrafficPicture
 
 SETUP_TIMES, SETUP_EVERY_S = 5, 1.0
+OTHER_VEHICLE = (
+    "another vehicle with the same number is heard: its clock or its place differs. Nothing of it is used, and it is "
+    f"asked again after {REFUSED_S:.0f} s."
+)
 READ_BACK_AFTER_S = (0.0, 5.0, 15.0)
 AVOIDS_AGAIN = (
     "The link has restarted: nothing avoided obstacles meanwhile. Avoidance is on again. Look where the vehicle is."
@@ -141,7 +145,10 @@ class Session:
     def settle_ways(self, peers: Peers) -> None:
         """What the comparison of the clocks has found."""
         for way in self.vehicle.part_ways():
-            peers.part(way.address, refused=way.identity == "other")
+            is_other = way.identity == "other"
+            peers.part(way.address, time.monotonic(), refused=is_other)
+            if is_other:
+                self.vehicle.tell(WARNING, f"Link: over {way.address} {OTHER_VEHICLE}")
         for way in self.vehicle.ways:
             peers.know(way.address, is_known=way.identity == "known")
 

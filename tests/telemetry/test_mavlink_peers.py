@@ -2,7 +2,7 @@
 
 import pytest
 
-from telemetry.link.peers import FORGET_S, MOST_CANDIDATES, TRY_S, Peers, Source
+from telemetry.link.peers import FORGET_S, MOST_CANDIDATES, REFUSED_S, TRY_S, Peers, Source
 from telemetry.topics.messages import LOST_S, Candidate
 from tests.telemetry.frames import attitude, ground_station_heartbeat, heard, heartbeat
 
@@ -199,14 +199,19 @@ def test_who_is_asked_is_neither_vehicle_nor_imposter_until_it_is_known() -> Non
     assert not peers.may_join(at("10.0.0.7:5761", address=TCP), heard(heartbeat()), 0.4)
 
 
-def test_who_turned_out_to_be_another_vehicle_is_not_asked_again() -> None:
+def test_who_turned_out_to_be_another_vehicle_is_not_asked_again_for_a_while() -> None:
     peers = with_a_way()
     candidate = asked(peers, THERE, 0.1)
-    peers.part(TCP, refused=True)
+    peers.part(TCP, 0.2, refused=True)
     assert peers.hear(THERE, heard(heartbeat()), 0.2) == "stranger"
     assert not peers.may_join(THERE, heard(heartbeat()), 0.2)
     assert candidate in peers.candidates(0.2)
     assert peers.warnings(0.2) != ()
+    later_s = 0.2 + REFUSED_S
+    peers.hear(HERE, heard(heartbeat()), later_s)
+    assert not peers.may_join(THERE, heard(heartbeat()), later_s - 0.1)
+    assert peers.may_join(THERE, heard(heartbeat()), later_s)
+    peers.hear(HERE, heard(heartbeat()), 0.3)
     peers.forget(TCP)
     peers.take_as_way(TCP)
     assert peers.may_join(THERE, heard(heartbeat()), 0.3), "the connection was made anew"
