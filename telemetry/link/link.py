@@ -211,7 +211,7 @@ class Link:
     def _heard(self, line: Line, source: Source, message: Message) -> None:
         now_s, t_utc_s = time.monotonic(), time.time()
         frame = bytes(message.get_msgbuf())
-        proof = self.keys.judge(source.system_id, message.get_msgId(), frame, now_s, way=line.text)
+        proof = self.keys.judge(source.system_id, message.get_msgId(), frame, now_s, way=source.way)
         if proof != "good":
             if proof == "replayed" and is_vehicle_heartbeat(message):
                 self._tell_time(line, source, now_s)

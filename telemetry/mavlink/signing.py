@@ -25,7 +25,10 @@ FARTHEST = 366 * 86_400 * PER_S
 """A timestamp may be so much ahead: a vehicle with a clock, a computer without one. The largest one would lock out all
 others for ever."""
 COPY = 5 * PER_S
-"""A frame that came over another way before is a copy, once, unless it is older than this."""
+"""A frame that came over another way before is a copy, once, unless it is older than this, or the newest was proven
+longer ago: a vehicle that has fallen silent sends no copies."""
+MOST_WAYS = 64
+"""That copies are taken from at once."""
 UNSIGNED = frozenset({mavlink.MAVLINK_MSG_ID_RADIO_STATUS, mavlink.MAVLINK_MSG_ID_RADIO})
 """Radios put these between the vehicle's own, and have no key."""
 _HEADER, _CHECKSUM, _SIGNATURE, _HASH = 10, 2, 13, 6
@@ -55,6 +58,8 @@ class Signing:
     _floors: dict[Stream, int] = field(init=False)
     """What was proven before this process: below it nothing is a copy."""
     _by_way: dict[tuple[Stream, str], int] = field(init=False, default_factory=dict)
+    _proven: dict[Stream, int] = field(init=False, default_factory=dict)
+    """When, by our clock, the newest of each was proven."""
 
     def __post_init__(self) -> None:
         self._floors = dict(self.streams)
@@ -73,30 +78,40 @@ class Signing:
     def verify(self, frame: bytes, *, now: int, way: str = "") -> Verdict:
         """Of a whole frame whose checksum holds. What is good is remembered; nothing else changes anything.
 
-        ``way``: the connection that it came on. Each brings every frame once, the slower one a little later.
+        ``way``: the connection that it came on, and who sent it there. Each brings every frame once, the slower one a
+        little later.
         """
         if not is_signed(frame) or len(frame) < _HEADER + _SIGNATURE:
             return "unsigned"
         if not hmac.compare_digest(_hash(self.key, frame[:-_HASH]), frame[-_HASH:]):
             return "wrong"
         stream, at = (frame[5], frame[6], frame[-_SIGNATURE]), int.from_bytes(frame[-12:-6], "little")
-        if self._is_replayed(stream, at, way):
+        if self._is_replayed(stream, at, way, now):
             return "replayed"
         if at > max(now, self.newest) + FARTHEST:
             return "ahead"
-        self._by_way[stream, way] = at
-        self.streams[stream] = max(at, self.streams.get(stream, 0))
+        if at > self.streams.get(stream, 0):
+            self.streams[stream], self._proven[stream] = at, now
+        self._remember(stream, at, way)
         self.newest = max(self.newest, at)
         return "good"
 
-    def _is_replayed(self, stream: Stream, at: int, way: str) -> bool:
+    def _remember(self, stream: Stream, at: int, way: str) -> None:
+        self._by_way[stream, way] = at
+        if len(self._by_way) >= MOST_WAYS:  # what is older than any copy may be says nothing any more
+            oldest = {each: newest - COPY for each, newest in self.streams.items()}
+            self._by_way = {key: at for key, at in self._by_way.items() if at >= oldest.get(key[0], 0)}
+
+    def _is_replayed(self, stream: Stream, at: int, way: str, now: int) -> bool:
         newest = self.streams.get(stream)
         if newest is None:
             return at + YOUNG < self.newest
         if at > newest:
             return False
         before = max(self._by_way.get((stream, way), 0), self._floors.get(stream, 0))
-        return at <= before or at + COPY < newest
+        is_full = (stream, way) not in self._by_way and len(self._by_way) >= MOST_WAYS
+        is_late = not 0 <= now - self._proven.get(stream, -COPY - 1) <= COPY
+        return at <= before or at + COPY < newest or is_late or is_full
 
 
 def _hash(key: bytes, signed: bytes | bytearray) -> bytes:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import stat
+import time
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,10 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import NotAllowedError, SilentError
+from telemetry.link.peers import Source
 from telemetry.link.signatures import KeyRing
 from telemetry.mavlink.codec import Parser
-from telemetry.mavlink.signing import COPY, EPOCH_S, FARTHEST, PER_S, YOUNG, Signing, timestamp_of
+from telemetry.mavlink.signing import COPY, EPOCH_S, FARTHEST, MOST_WAYS, PER_S, YOUNG, Signing, timestamp_of
 from telemetry.simulation.simulator.run import SimOptions, flying
 from telemetry.topics.messages import RawFrame
 from telemetry.topics.requests import Arm, Connect, SetSigning
@@ -105,6 +107,46 @@ def test_the_copy_over_a_second_way_is_good_once_and_not_late() -> None:
     assert {ours.verify(frame, now=NOW, way="radio") for frame in frames} == {"replayed"}
     assert ours.verify(signed(other_side(timestamp=NOW + COPY + 200)), now=NOW, way="radio") == "good"
     assert ours.verify(frames[-1], now=NOW, way="another") == "replayed"
+
+
+def test_long_after_the_newest_nothing_is_a_copy_whatever_the_vehicles_clock_says() -> None:
+    ours, theirs = Signing(KEY), other_side()
+    frames = [signed(theirs, attitude(k)) for k in range(20)]
+    assert {ours.verify(frame, now=NOW, way="radio") for frame in frames} == {"good"}
+    assert ours.verify(frames[5], now=NOW + COPY, way="wifi") == "good"
+    assert ours.verify(frames[6], now=NOW + COPY + 1, way="wifi") == "replayed"
+    assert ours.verify(frames[6], now=NOW - 1, way="wifi") == "replayed", "our clock was set back"
+    assert ours.verify(signed(theirs), now=NOW + COPY + 1, way="wifi") == "good"
+
+
+def test_copies_are_taken_from_so_many_at_once_and_from_the_next_when_those_are_old() -> None:
+    ours, theirs = Signing(KEY), other_side()
+    frames = [signed(theirs, attitude(k)) for k in range(3)]
+    assert ours.verify(frames[2], now=NOW, way="radio") == "good"
+    found = [ours.verify(frames[1], now=NOW, way=f"port {k}") for k in range(2 * MOST_WAYS)]
+    assert found == ["good"] * (MOST_WAYS - 1) + ["replayed"] * (MOST_WAYS + 1)
+    later = other_side(timestamp=NOW + COPY + 100)
+    first, second = signed(later), signed(later)
+    assert {ours.verify(frame, now=NOW, way="radio") for frame in (first, second)} == {"good"}
+    assert ours.verify(first, now=NOW, way="wifi") == "good"
+
+
+def test_what_another_sends_to_a_way_silences_nobody_there() -> None:
+    async def whole() -> None:
+        keys = KeyRing(None, clock=lambda: T_UTC_S)
+        keyed = keys.new_key(1)
+        keyed.mode = "on"
+        theirs, parser = other_side(key=keyed.signing.key), Parser(datagrams=True)
+        async with console(keys=keys) as bench:
+            await bench.handle(Connect(ME, address := f"udpin:127.0.0.1:{free_port()}"))
+            await bench.handle(Connect(ME, other := f"udpin:127.0.0.1:{free_port()}"))
+            (message,) = parser.feed(signed(theirs))
+            for at, peer in ((address, "10.0.0.2:1"), (other, "10.0.0.66:6"), (other, "10.0.0.2:2")):
+                bench.link._heard(bench.link.lines[at], Source(at, peer, 1, 1), message)
+            assert keyed.status.replayed == 0
+            assert {candidate.peer for candidate in bench.link.peers.candidates(time.monotonic())} >= {"10.0.0.2:2"}
+
+    run(whole)
 
 
 def test_what_was_proven_before_a_restart_is_no_copy() -> None:
