@@ -87,7 +87,9 @@ class LinkNode:
         self._expected = False
 
     async def take_up(self, memory: Memory, links: list[str]) -> None:
-        """What the node before this one had; then what this one was started with."""
+        """What the node before this one had; then what this one was started with. Whoever else is heard first while a
+        vehicle is missed is not adopted in its stead.
+        """
         adopted = memory.adopted
         if adopted is not None:
             now_s = time.monotonic()
@@ -96,12 +98,11 @@ class LinkNode:
         before = {place.address: place for place in (*([adopted] if adopted else []), *memory.ways)}
         for wanted in memory.connections:
             only = before.get(wanted.address)
-            await self._link.connect(
-                wanted.address, adopt=wanted.adopt or only is not None, only=only, as_way=wanted.as_way
-            )
+            adopt = wanted.adopt if adopted is None else only is not None
+            await self._link.connect(wanted.address, adopt=adopt, only=only, as_way=wanted.as_way)
         for address in links:
             if address not in self._link.lines:
-                await self._link.connect(address, adopt=True, as_way=len(links) > 1)
+                await self._link.connect(address, adopt=adopted is None, as_way=len(links) > 1)
         self._memory, self._expected = memory, adopted is not None
         self._link.flight.take_up(memory.flight)
 

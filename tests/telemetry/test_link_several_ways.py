@@ -6,25 +6,20 @@ import contextlib
 import time
 from collections import Counter
 from collections.abc import AsyncIterator
-from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import NotAllowedError
-from telemetry.link.answering import OperatorRight
 from telemetry.link.ways.ways import SETTLE_S
-from telemetry.nodes.link import LinkNode, Memory, Wanted, read_memory
 from telemetry.simulation.simulator.autopilot.flight_modes import Hold
 from telemetry.simulation.simulator.run import SimOptions, Simulator, flying
 from telemetry.topics.link_ways import WayStatus
-from telemetry.topics.messages import Candidate, RawFrame
+from telemetry.topics.messages import RawFrame
 from telemetry.topics.requests import Adopt, Arm, Connect, Disarm, Disconnect, Pause, Resume, SetSigning, StartAuto
 from tests.telemetry.bus_runs import run
-from tests.telemetry.fake_vehicle import UdpVehicle
-from tests.telemetry.link_bench import ME, Console, console, free_port, until
+from tests.telemetry.link_bench import ME, Console, console, until
 from tests.telemetry.test_mavlink_flights import ALT_M, LAT_DEG, LON_DEG, items, phase, start, upload
 from tests.telemetry.udp_faults import Proxy, lossy_udp, routed_udp
 
@@ -327,55 +322,5 @@ def test_a_connection_that_is_not_named_as_a_way_never_becomes_one() -> None:
             await bench.handle(Connect(ME, at(other)))
             await until(lambda: any("second vehicle" in warning for warning in bench.status.warnings))
             assert len(bench.status.ways) == 1
-
-    run(whole)
-
-
-def test_a_link_that_starts_again_beats_on_all_ways_and_comes_back_with_them(tmp_path: Path) -> None:
-    async def whole() -> None:
-        async with (
-            vehicle(speedup=1.0) as (_, port),
-            lossy_udp(port, loss=0.0) as one,
-            lossy_udp(port, loss=0.0) as other,
-        ):
-            written = tmp_path / "link.json"
-            async with console() as bench:
-                await reached(bench, at(one), at(other))
-                await until(lambda: len(bench.link.peers.places) == 2)
-                node = LinkNode(bench.link, OperatorRight(), cast(Any, SimpleNamespace()), written)
-                await node.remember()
-                memory = read_memory(written)
-            assert [place.address for place in memory.ways] == [at(one), at(other)]
-            assert memory.connections == (Wanted(at(one), True, True), Wanted(at(other), False, True))
-            async with console() as bench:
-                node = LinkNode(bench.link, OperatorRight(), cast(Any, SimpleNamespace()), written)
-                one.is_cut = True
-                await node.take_up(memory, [])
-                await bench.live()
-                assert used(bench) == at(other)
-                one.is_cut = False
-                await until(lambda: len(bench.status.ways) == 2)
-                await until(lambda: all(each.identity == "known" for each in bench.status.ways))
-
-    run(whole)
-
-
-def test_until_it_is_heard_again_the_vehicle_gets_heartbeats_at_every_place_that_was_known() -> None:
-    async def whole() -> None:
-        addresses = [f"udpin:127.0.0.1:{free_port()}" for _ in range(2)]
-        radios = [UdpVehicle(int(address.rpartition(":")[2])) for address in addresses]
-        first, second = (
-            Candidate(f"{address}/x", address, f"127.0.0.1:{radio.port}", 1, 1, "ardupilot", 2)
-            for address, radio in zip(addresses, radios, strict=True)
-        )
-        async with console() as bench:
-            node = LinkNode(bench.link, OperatorRight(), cast(Any, SimpleNamespace()), Path("unused"))
-            wanted = tuple(Wanted(address, False, True) for address in addresses)
-            await node.take_up(Memory(wanted, first, ways=(first, second)), [])
-            await until(lambda: all(radio.kinds() == {"HEARTBEAT"} for radio in radios))
-            assert bench.status.adopted == first
-            assert bench.status.state == "lost"
-        for radio in radios:
-            radio.close()
 
     run(whole)

@@ -118,7 +118,7 @@ export async function startFlight(): Promise<void> {
 const CONNECTION = "connection";
 
 export const connectTo = (address: string, asWay: boolean) =>
-  order({ place: CONNECTION, path: "/api/link/connect", body: { address, adopt: true, as_way: asWay } });
+  order({ place: CONNECTION, path: "/api/link/connect", body: { address, adopt: !asWay, as_way: asWay } });
 export const disconnect = (address: string) =>
   order({ place: CONNECTION, path: "/api/link/disconnect", body: { address } });
 export const adopt = (candidate: string) =>
