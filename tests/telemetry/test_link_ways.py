@@ -1,10 +1,7 @@
-"""Several ways to one vehicle, with clocks of the test's own: which is in use, whose vehicle it is, what is a copy."""
+"""Several ways to one vehicle, with clocks of the test's own: which is in use, and whose vehicle it is."""
 
 from __future__ import annotations
 
-import random
-from collections import Counter
-from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
@@ -12,90 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from telemetry.link.ways.copies import ANSWERS, KEEP_S, MOST, Copies
 from telemetry.link.ways.way import SILENT_S, TELLS_S, Way
-from telemetry.link.ways.ways import SETTLE_S, ChangeOver, Ways
-from telemetry.topics.messages import LOST_S, STALE_S, Candidate
+from telemetry.link.ways.ways import SETTLE_S, Ways
+from telemetry.topics.messages import LOST_S, STALE_S
 from tests.telemetry.frames import attitude, heard, heartbeat
-
-TICK_S = 0.05
-RADIO, WIFI, LTE = "/dev/ttyUSB0:57600", "udpin:0.0.0.0:14550", "tcp:10.0.0.7:5760"
-
-
-def candidate(address: str) -> Candidate:
-    return Candidate(f"{address}/x/1/1", address, "x", 1, 1, "ardupilot", 2)
+from tests.telemetry.way_carriers import LTE, RADIO, TICK_S, WIFI, Carrier, Field, candidate
 
 
 def position(lat_deg: float) -> Any:
     return mavlink.MAVLink_global_position_int_message(0, round(lat_deg * 1e7), 89_000_000, 0, 0, 0, 0, 0, 0)
-
-
-@dataclass
-class Carrier:
-    """What a test's way does to packets."""
-
-    hz: float = 20.0
-    loss: float = 0.0
-    delay_s: float = 0.05
-    boot_s: float = -90.0
-    """The clock at its far end is so much ahead of ours."""
-    cut: bool = False
-    deaf: bool = False
-    """Nothing that goes out over it arrives."""
-    sequence: int = 0
-    due_s: float = 0.0
-    underway: list[tuple[float, Any]] = field(default_factory=list)
-
-
-class Field:
-    """Ways over carriers in simulated time; ``changes`` with the time of each."""
-
-    def __init__(self, seed: int = 0, *, routed: bool = False, answers: bool = True, **carriers: Carrier) -> None:
-        """``routed``: each answer comes over all of them."""
-        self._routed, self._answers = routed, answers
-        self.now_s, self._random = 100.0, random.Random(seed)
-        addresses = {"radio": RADIO, "wifi": WIFI, "lte": LTE}
-        self.carriers = {addresses[name]: carrier for name, carrier in carriers.items()}
-        first, *others = self.carriers
-        self.ways = Ways(candidate(first), self.now_s)
-        for address in others:
-            self.ways.add(candidate(address))
-        self.changes: list[tuple[float, ChangeOver]] = []
-
-    def run(self, seconds: float) -> None:
-        end_s = self.now_s + seconds
-        while self.now_s < end_s:
-            self._tick()
-
-    def _tick(self) -> None:
-        self.now_s += TICK_S
-        for address, carrier in self.carriers.items():
-            if self.now_s >= carrier.due_s:
-                carrier.due_s = self.now_s + 1 / carrier.hz
-                self._send(carrier, attitude(), carrier.delay_s)
-            arrived = [message for at_s, message in carrier.underway if at_s <= self.now_s]
-            carrier.underway = [(at_s, message) for at_s, message in carrier.underway if at_s > self.now_s]
-            for message in arrived:
-                self.ways.hear(address, message, self.now_s)
-        for way, question in self.ways.on_tick(self.now_s):
-            carrier = self.carriers[way.address]
-            if self._answers and self._random.random() >= carrier.loss and not (carrier.cut or carrier.deaf):
-                tc1 = int((self.now_s + carrier.delay_s + carrier.boot_s) * 1e9)
-                answer = mavlink.MAVLink_timesync_message(tc1, question.ts1)
-                for back in self.carriers.values() if self._routed else [carrier]:
-                    self._send(back, answer, carrier.delay_s + back.delay_s)
-        self.ways.lapse(self.now_s)
-        if (change := self.ways.choose(self.now_s)) is not None:
-            self.changes.append((self.now_s, change))
-
-    def _send(self, carrier: Carrier, message: Any, delay_s: float) -> None:
-        carrier.sequence = (carrier.sequence + 1) % 256
-        if self._random.random() >= carrier.loss and not carrier.cut:
-            carrier.underway.append((self.now_s + delay_s, heard(message, sequence=carrier.sequence)))
-
-    @property
-    def used(self) -> str:
-        return self.ways.chosen.address
 
 
 def test_the_same_clock_makes_a_way_of_whoever_has_the_numbers() -> None:
@@ -339,117 +261,6 @@ def test_with_one_way_everything_counts() -> None:
     ways = Ways(candidate(WIFI), 0.0)
     ack = heard(mavlink.MAVLink_command_ack_message(400, 0, 0, 0, 255, 190))
     assert all(ways.takes(WIFI, message, 0.0) for message in [ack, ack, heard(heartbeat())])
-
-
-@given(
-    said=st.lists(st.integers(0, 5), max_size=60),
-    losses=st.tuples(st.floats(0, 0.9), st.floats(0, 0.9)),
-    late=st.integers(0, 20),
-    seed=st.integers(0, 999),
-)
-def test_everything_that_comes_by_any_way_is_used_and_nothing_more_often_than_it_was_said(
-    said: list[int], losses: tuple[float, float], late: int, seed: int
-) -> None:
-    """Slow oracle: of each content no more than was said, no less than the way that brought most of it brought."""
-    chance, copies = random.Random(seed), Copies()
-    arrivals = [
-        (at + (late if way else 0), way, what)
-        for at, what in enumerate(said)
-        for way in (0, 1)
-        if chance.random() >= losses[way]
-    ]
-    used: Counter[int] = Counter()
-    for at, way, what in sorted(arrivals):
-        message = heard(mavlink.MAVLink_command_ack_message(what, 0, 0, 0, 255, 190), sequence=at % 256)
-        used[what] += copies.is_new(f"way {way}", message, at / 10)
-    for what in range(6):
-        by_way = [sum(w == way and content == what for _, w, content in arrivals) for way in (0, 1)]
-        assert max(by_way) <= used[what] <= said.count(what)
-
-
-def test_copies_are_forgotten_and_bounded() -> None:
-    copies = Copies()
-    text = heard(mavlink.MAVLink_statustext_message(6, b"Arming motors"))
-    assert copies.is_new(WIFI, text, 0.0)
-    assert not copies.is_new(LTE, text, KEEP_S)
-    assert copies.is_new(LTE, text, 2 * KEEP_S)
-    for number in range(2 * MOST):
-        copies.is_new(WIFI, heard(mavlink.MAVLink_log_data_message(1, number, 1, [0] * 90)), 2 * KEEP_S)
-    assert copies.is_new(WIFI, text, 2 * KEEP_S)
-
-
-def test_an_answer_in_the_old_dialect_is_the_same_answer() -> None:
-    message = mavlink.MAVLink_mission_count_message(255, 190, 3)
-    old = mavlink.MAVLink(None, 1, 1)
-    first = old.decode(bytearray(message.pack(old, force_mavlink1=True)))
-    copies = Copies()
-    assert copies.is_new(RADIO, first, 0.0)
-    assert not copies.is_new(WIFI, heard(message), 0.1)
-
-
-def test_only_what_the_dialect_has_is_listed() -> None:
-    assert {kind.msgname for kind in mavlink.mavlink_map.values()} >= ANSWERS
-
-
-@pytest.mark.parametrize("routed", [False, True])
-def test_a_way_over_which_the_vehicle_hears_nothing_is_left_and_not_used_again_before_it_does(routed: bool) -> None:
-    field_ = Field(wifi=Carrier(), lte=Carrier(delay_s=0.15), routed=routed)
-    field_.run(10.0)
-    assert field_.used == WIFI
-    field_.carriers[WIFI].deaf = True
-    field_.run(5.0)
-    ((_, change),) = field_.changes
-    assert (field_.used, change.is_loss) == (LTE, True)
-    assert "unanswered" in change.why
-    deaf, heard_ = field_.ways.status(field_.now_s)
-    assert (deaf.address, deaf.round_trip_s, deaf.quality) == (WIFI, None, pytest.approx(1.0, abs=0.1))
-    assert heard_.round_trip_s == pytest.approx(0.3, abs=2 * TICK_S)
-    field_.run(30.0)
-    assert len(field_.changes) == 1
-    field_.carriers[WIFI].deaf, back_s = False, field_.now_s
-    field_.run(30.0)
-    assert field_.used == WIFI
-    assert field_.changes[-1][0] - back_s >= SETTLE_S
-
-
-def test_over_a_way_that_is_deaf_the_state_is_still_better_than_none() -> None:
-    field_ = Field(wifi=Carrier(), lte=Carrier())
-    field_.run(5.0)
-    field_.carriers[LTE].deaf = True
-    field_.run(6.0)
-    field_.carriers[WIFI].cut = True
-    field_.run(2.0)
-    assert field_.used == LTE
-
-
-def test_a_vehicle_that_answers_no_question_any_more_stays_on_its_way() -> None:
-    field_ = Field(wifi=Carrier(), lte=Carrier(hz=9.0, delay_s=0.2))
-    field_.run(10.0)
-    field_._answers = False
-    field_.run(30.0)
-    assert (field_.used, field_.changes) == (WIFI, [])
-    silent = Field(wifi=Carrier(), answers=False)
-    silent.run(30.0)
-    (shown,) = silent.ways.status(silent.now_s)
-    assert (shown.round_trip_s, shown.quality) == (None, 1.0)
-
-
-def test_what_is_lost_both_ways_is_hardly_ever_taken_for_deafness() -> None:
-    whys: list[str] = []
-    for seed in range(6):
-        field_ = Field(seed, radio=Carrier(loss=0.3, delay_s=0.1), lte=Carrier(loss=0.3, delay_s=0.1))
-        field_.run(60.0)
-        whys += [change.why for _, change in field_.changes]
-    assert sum("unanswered" in why for why in whys) <= 1, "in six minutes"
-
-
-def test_behind_a_router_each_way_takes_its_own_answer() -> None:
-    field_ = Field(wifi=Carrier(delay_s=0.01), radio=Carrier(hz=5.0, delay_s=0.4), routed=True)
-    field_.run(8.0)
-    wifi, radio = field_.ways.status(field_.now_s)
-    assert wifi.round_trip_s == pytest.approx(0.02, abs=2 * TICK_S)
-    assert radio.round_trip_s == pytest.approx(0.8, abs=2 * TICK_S)
-    assert radio.identity == "known"
 
 
 def test_what_is_shown_of_a_way() -> None:
