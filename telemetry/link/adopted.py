@@ -73,6 +73,8 @@ class AdoptedVehicle:
         """Hedgehop's own, as it says with its capabilities."""
         self._telling, self._clock = telling, clock
         self._streams = self._requests(now_s)
+        self._streams_of = {candidate.address: self._streams}
+        """By way: autopilots send what was asked for on the way that it was asked on."""
         self.believing, self._doubted = Believing(flies=flies), False
         self._boot, self._speech = BootClock(), Speech(self.target)
         self._next_state: asyncio.Future[None] | None = None
@@ -125,12 +127,14 @@ class AdoptedVehicle:
         """It sends from another port now, as the operator says."""
         self.candidate = candidate
         self.ways, self._lines = Ways(candidate, self._clock()), {candidate.address: line}
+        self._streams_of = {candidate.address: self._streams}
         self.send_first()
 
     def ask_way(self, candidate: Candidate, line: Line) -> None:
         """Somebody with its numbers is heard there too. A heartbeat: some vehicles answer nobody without."""
         self.ways.add(candidate)
         self._lines[candidate.address] = line
+        self._streams_of.pop(candidate.address, None)
         way = self.ways.get(candidate.address)
         if way is not None:
             self._send_over(way, heartbeat())
@@ -147,6 +151,7 @@ class AdoptedVehicle:
         parted = self.ways.part(self._clock())
         for way in parted:
             del self._lines[way.address]
+            self._streams_of.pop(way.address, None)
         return parted
 
     def leave_way(self, address: str) -> bool:
@@ -166,6 +171,7 @@ class AdoptedVehicle:
         if change is not None:
             self._change_over(change, now_s)
         del self._lines[address]
+        self._streams_of.pop(address, None)
         if self.candidate.address == address:
             self.candidate = self.ways.chosen.candidate
         return True
@@ -316,8 +322,11 @@ class AdoptedVehicle:
         self._telling.state(state)
 
     def _change_over(self, change: ChangeOver, now_s: float) -> None:
-        """Autopilots send what was asked for on the way that it was asked on: it is asked for anew."""
-        self._streams = self._requests(now_s)
+        """What was not asked for on this way yet is."""
+        kept = self._streams_of.get(change.now.address)
+        if kept is not None:
+            kept.go_on(now_s)
+        self._streams = self._streams_of[change.now.address] = kept or self._requests(now_s)
         text = f"Link: now over {change.now.address}, not {change.before.address}: {change.why}."
         self._telling.text(WARNING if change.is_loss else INFO, text)
         self._telling.changed_over(text)
@@ -327,16 +336,21 @@ class AdoptedVehicle:
         slow = address.kind == "serial" and address.baud < FAST_LINK_BAUD
         return StreamRequests(self.target, self.candidate.autopilot, slow=slow, now_s=now_s)
 
+    def _ask_anew(self, now_s: float) -> None:
+        """It may have forgotten what was asked, on every way."""
+        self._streams.restart(now_s)
+        self._streams_of = {self.ways.chosen.address: self._streams}
+
     def _came_back(self, now_s: float) -> None:
         """After so long a silence it may have been restarted; in flight its boot clock will tell."""
-        self._streams.restart(now_s)
+        self._ask_anew(now_s)
         if not self.state.armed:
             self.onboard.forget()
             self._telling.unsure()
 
     def _restarted(self, now_s: float) -> None:
         self._boot, self._speech = BootClock(), Speech(self.target)
-        self._streams.restart(now_s)
+        self._ask_anew(now_s)
         self.onboard.forget()
         self._telling.unsure()
 

@@ -16,6 +16,10 @@ RARE_S = 12.0
 ENOUGH = 0.5
 """Share of the wanted rate that is good enough."""
 TRIES_OF_A_MESSAGE = 5
+FEW = 4
+"""Requests that go out at once: what is ordered must not stand behind twenty of them on a radio."""
+LOOK_S = 1.0
+"""On a way that was asked before, what still comes is counted for so long before anything is asked again."""
 
 FAST_HZ: dict[str, float] = {
     "GLOBAL_POSITION_INT": 20,
@@ -74,6 +78,12 @@ class StreamRequests:
         self._seen_once: set[str] = set()
         self._refused_since_s: float | None = None
         self._since_s, self._next_s, self._pause_s = now_s, now_s, CHECK_EVERY_S
+        self._waiting: list[Message] = []
+
+    def go_on(self, now_s: float) -> None:
+        """Its way is in use again, and the vehicle has not started anew since: only what does not come is asked for."""
+        self._counts = dict.fromkeys(self._counts, 0)
+        self._since_s, self._next_s, self._pause_s = now_s, now_s + LOOK_S, CHECK_EVERY_S
 
     def on_message(self, message: Message, now_s: float) -> None:
         name = message.get_type()
@@ -85,10 +95,16 @@ class StreamRequests:
             self._on_ack(message.result, now_s)
 
     def on_tick(self, now_s: float) -> list[Message]:
-        if now_s < self._next_s:
-            return []
+        """A few at a time, the needed ones first."""
+        if now_s >= self._next_s:
+            self._waiting = self._requests(now_s)
+        few, self._waiting = self._waiting[:FEW], self._waiting[FEW:]
+        return few
+
+    def _requests(self, now_s: float) -> list[Message]:
         first = self._next_s == self._since_s
         missing = [name for name in self._wanted if first or self._is_short(name, now_s - self._since_s)]
+        missing.sort(key=lambda name: name not in _NEEDED)
         requests = [self._interval(name) for name in missing]
         requests += [self._request(name) for name in self._once if self._is_unseen(name)]
         if self._refused_since_s is not None and any(name in _NEEDED for name in missing):

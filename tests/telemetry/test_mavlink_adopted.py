@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from typing import Any, cast
 
 import pytest
@@ -168,6 +169,38 @@ def test_the_next_way_is_tried_after_a_refusal() -> None:
         await both
 
     with_bench(act)
+
+
+def test_a_change_back_to_a_way_asks_for_nothing_at_once() -> None:
+    bench = Bench()
+    other, second = replace(CANDIDATE, id="other", address="tcp:127.0.0.1:5761"), Wire()
+    bench.vehicle.ask_way(other, cast(Line, second))
+    for way in bench.vehicle.ways:
+        way.identity = "known"
+
+    def asked(seconds: float) -> list[int]:
+        """Commands over each, while messages come over one alone."""
+        for wire in (bench.wire, second):
+            wire.sent.clear()
+        for _ in range(round(seconds / 0.05)):
+            bench.now_s += 0.05
+            bench.vehicle.on_spare(heard(attitude()), over)
+            bench.vehicle.on_tick()
+        return [wire.kinds().count("COMMAND_LONG") for wire in (bench.wire, second)]
+
+    def change_over() -> list[int]:
+        before = bench.vehicle.line
+        while bench.vehicle.line is before:
+            asked(0.05)
+        return asked(0.9)
+
+    over = CANDIDATE.address
+    assert asked(0.9)[0] > 15
+    over = other.address
+    assert change_over()[1] > 15
+    over = CANDIDATE.address
+    assert change_over() == [0, 0]
+    assert asked(0.5)[0] > 0, "most of it does not come"
 
 
 def test_waiting_for_what_does_not_come_ends() -> None:

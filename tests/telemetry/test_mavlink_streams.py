@@ -5,7 +5,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from telemetry.link.streams import FAST_HZ, StreamRequests
+from telemetry.link.streams import FAST_HZ, FEW, StreamRequests
 from tests.telemetry.frames import attitude, heard
 
 NAMES = {kind.id: kind.msgname for kind in mavlink.mavlink_map.values()}
@@ -94,6 +94,26 @@ def test_a_vehicle_that_silently_forgot_is_asked_again_too() -> None:
     vehicle.hz.clear()
     watch(requests, vehicle, 20, since_s=10.0)
     assert vehicle.hz["ATTITUDE"] == 20
+
+
+def test_requests_go_out_a_few_at_a_time_and_the_needed_ones_first() -> None:
+    requests = StreamRequests((1, 1), "ardupilot", slow=True, now_s=0.0)
+    said = [requests.on_tick(step * STEP_S) for step in range(10)]
+    assert [len(few) for few in said[:4]] == [FEW] * 4
+    first = [NAMES[int(message.param1)] for few in said for message in few]
+    assert {"GLOBAL_POSITION_INT", "ATTITUDE", "SYS_STATUS", "GPS_RAW_INT", "MISSION_CURRENT"} == set(first[:5])
+    assert len(first) == len(set(first)) + 1, "HOME_POSITION once and by its rate"
+
+
+def test_on_a_way_that_is_in_use_again_only_what_does_not_come_is_asked_for() -> None:
+    vehicle = Vehicle()
+    requests = StreamRequests((1, 1), "ardupilot", slow=False, now_s=0.0)
+    watch(requests, vehicle, 10)
+    vehicle.asked.clear()
+    del vehicle.hz["ATTITUDE"]
+    requests.go_on(60.0)
+    watch(requests, vehicle, 2, since_s=60.0)
+    assert set(vehicle.asked) - {"AUTOPILOT_VERSION"} == {"ATTITUDE"}, "this vehicle never tells its version"
 
 
 def test_an_autopilot_that_does_not_know_the_command_is_asked_in_the_old_way() -> None:
