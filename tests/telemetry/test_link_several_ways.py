@@ -18,9 +18,11 @@ from telemetry.simulation.simulator.run import SimOptions, Simulator, flying
 from telemetry.topics.link_ways import WayStatus
 from telemetry.topics.messages import RawFrame
 from telemetry.topics.requests import Adopt, Arm, Connect, Disarm, Disconnect, Pause, Resume, SetSigning, StartAuto
+from telemetry.traffic.picture import EVERY_S
 from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, Console, console, until
 from tests.telemetry.test_mavlink_flights import ALT_M, LAT_DEG, LON_DEG, items, phase, start, upload
+from tests.telemetry.traffic_messages import adsb_message, over_the_air
 from tests.telemetry.udp_faults import Proxy, lossy_udp, routed_udp
 
 OF_EVERY_WAY = {mavlink.MAVLINK_MSG_ID_HEARTBEAT, mavlink.MAVLINK_MSG_ID_TIMESYNC}
@@ -232,6 +234,28 @@ def test_the_last_way_over_which_a_vehicle_is_heard_stays_while_it_may_fly_and_i
             assert bench.status.again is not None
             await bench.handle(Adopt(ME, bench.status.again.id))
             await until(lambda: (used(bench), bench.status.state) == (at(one), "live"))
+
+    run(whole)
+
+
+def test_aircraft_that_a_receiver_on_a_spare_way_hears_are_traffic_as_well() -> None:
+    async def whole() -> None:
+        async with (
+            vehicle(speedup=1.0) as (_, port),
+            lossy_udp(port, loss=0.0) as one,
+            lossy_udp(port, loss=0.0) as other,
+            console() as bench,
+        ):
+            await reached(bench, at(one), at(other))
+            session = bench.link.session
+            assert session is not None
+            now_s = time.monotonic()
+            for number, address in enumerate((at(one), at(other), "udpin:127.0.0.1:1"), start=1):
+                aircraft = over_the_air(adsb_message(ICAO_address=number), system=200)
+                session.on_stranger(aircraft, now_s, address)
+            told = session.traffic.on_tick(session.vehicle.state, now_s + EVERY_S, time.time())
+            assert told is not None
+            assert told.status.heard == 2
 
     run(whole)
 
