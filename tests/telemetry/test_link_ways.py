@@ -182,7 +182,9 @@ def test_between_changes_for_the_better_lies_the_time_to_settle(
     losses: tuple[float, ...], delays: tuple[float, ...], seed: int
 ) -> None:
     names = ("radio", "wifi", "lte")
-    carriers = {n: Carrier(loss=loss, delay_s=d) for n, loss, d in zip(names, losses, delays, strict=True)}
+    carriers: dict[str, Any] = {
+        n: Carrier(loss=loss, delay_s=d) for n, loss, d in zip(names, losses, delays, strict=True)
+    }
     field_ = Field(seed, **carriers)
     field_.run(25.0)
     for (before_s, _), (after_s, after) in zip(field_.changes, field_.changes[1:], strict=False):

@@ -81,8 +81,9 @@ def test_answers_are_counted_against_questions_that_are_due() -> None:
     answer = heard(mavlink.MAVLink_timesync_message(9, questions[3].ts1))
     assert clock.on_message(answer, 103.2) is not None
     assert (clock.share(105.5), clock.unanswered(105.5)) == (pytest.approx(1 / 5), 1)
-    clock.forget_unanswered()
-    assert (clock.share(110.0), clock.unanswered(110.0), clock.round_trip_s) == (1.0, 0, pytest.approx(0.2))
+    clock.forget_unanswered(105.5)
+    assert (clock.share(105.5), clock.unanswered(105.5), clock.round_trip_s) == (1.0, 0, pytest.approx(0.2))
+    assert clock.unanswered(110.0) == 1, "the last one was not due"
 
 
 def test_the_rate_is_what_really_happened() -> None:

@@ -99,14 +99,19 @@ class RoundTripClock:
         """Answers to questions that were asked after the last one that the other one has an answer to."""
         return sum(each is not None and each.asked_ns > other._answered_ns for each in self._asked.values())
 
-    def forget_unanswered(self) -> None:
+    def forget_unanswered(self, now_s: float) -> None:
         """Nothing could be heard: what did not come says nothing of what went out."""
-        self._asked = {asked_ns: reading for asked_ns, reading in self._asked.items() if reading is not None}
+        due_s = self._due_s(now_s)
+        self._asked = {at: each for at, each in self._asked.items() if each is not None or at / 1e9 >= due_s}
 
     def _outcomes(self, now_s: float) -> list[bool]:
         """Whether each question was answered, the oldest first, without those that well may be yet."""
-        due_s = now_s - min(max(DUE_S, 2 * (self.round_trip_s or 0.0)), DUE_LIMIT_S)
+        due_s = self._due_s(now_s)
         return [each is not None for at, each in self._asked.items() if each is not None or at / 1e9 < due_s]
+
+    def _due_s(self, now_s: float) -> float:
+        """What was asked before this may count as unanswered."""
+        return now_s - min(max(DUE_S, 2 * (self.round_trip_s or 0.0)), DUE_LIMIT_S)
 
     def on_message(self, message: Message, now_s: float) -> Reading | None:
         """The first answer to a question of ours."""

@@ -58,15 +58,16 @@ class Way:
 
     def hear(self, message: Message, now_s: float) -> Reading | None:
         """A message of the vehicle's autopilot that came over this way."""
+        reading = self.clock.on_message(message, now_s)
         if self.is_silent(now_s):
-            self.clock.forget_unanswered()
+            self.clock.forget_unanswered(now_s)
         self.heard_s = now_s
         self.quality.hear(message.get_seq(), now_s)
         if message.get_type() == "GLOBAL_POSITION_INT":
             lat_deg, lon_deg = lat_lon(message.lat, message.lon)
             if lat_deg is not None and lon_deg is not None:
                 self._place = ((lat_deg, lon_deg), now_s)
-        return self.clock.on_message(message, now_s)
+        return reading
 
     def hear_radio(self, message: Message, now_s: float) -> None:
         """RADIO_STATUS of the radio at this end."""
