@@ -1,9 +1,8 @@
 """All ways to the adopted vehicle, and the one in use: orders go over it alone, and the vehicle's state comes from it.
 
 Another one takes over at once when the one in use falls silent, or when the vehicle answers over the other one and no
-more over the one in use; while neither is so, only one that has been clearly
-better without a break for ``SETTLE_S``. A way is used when its vehicle is known to be the adopted one. No clock of its
-own: ``now_s`` is monotonic.
+more over the one in use; while neither is so, only one that has been clearly better without a break for ``SETTLE_S``.
+A way is used when its vehicle is known to be the adopted one. No clock of its own: ``now_s`` is monotonic.
 """
 
 from __future__ import annotations
