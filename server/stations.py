@@ -19,7 +19,7 @@ from server.flying.apart.other_vehicles import Other, known
 from server.flying.checklist_desk import ChecklistDesk
 from server.flying.checklists import Checklists
 from server.flying.flight_desk import FlightDesk
-from server.flying.in_flight.taking_up import TakingUp
+from server.flying.in_flight.take_up_desk import TakingUp
 from server.flying.in_flight.way_desk import WayDesk
 from server.flying.parameter_desk import ParameterDesk
 from server.flying.plan_followed import PlanFollowed

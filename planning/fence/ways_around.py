@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from mapping.geometry.arrays import F64, I64
-from planning.fence.zones import Disc, Zone, shadow
+from planning.fence.grown_zones import Disc, Zone, shadow
 
 TOUCHES_M = 1e-6
 """A way along a side does not enter."""

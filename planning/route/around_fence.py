@@ -13,9 +13,9 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from planning.fence.fence_model import Fence, LatLon, RallyPoint
+from planning.fence.grown_zones import Disc, Flat, disc_of, flat_shapes, zones_of
 from planning.fence.home_plane import HomePlane, plane_at
 from planning.fence.ways_around import Field, WayAround, field_of, way_around
-from planning.fence.zones import Disc, Flat, disc_of, flat_shapes, zones_of
 from planning.terrain.dsm import SurfaceModel
 
 ROUNDS = 4

@@ -11,8 +11,8 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from planning.basics.plan_model import Poi
 from planning.errors import PoiError
+from planning.fence.grown_zones import Flat, flat_shapes
 from planning.fence.home_plane import HomePlane, plane_at
-from planning.fence.zones import Flat, flat_shapes
 from planning.route.around_fence import Blocked, Kept, backs_of, blocked_of, longest_way_m
 from planning.route.poi import MIN_APART_M
 from planning.route.survey import MIN_LINE_M

@@ -16,8 +16,8 @@ from server.errors import CheckNeededError, ConflictError
 from server.flying.apart.other_vehicles import PENDING
 from server.flying.check_task import Checked
 from server.flying.checklist_desk import ChecklistDesk
+from server.flying.in_flight.take_up_desk import FIRMWARES, TakingUp, with_words
 from server.flying.in_flight.take_up_task import Asked, MadeTakeUp
-from server.flying.in_flight.taking_up import FIRMWARES, TakingUp, with_words
 from server.flying.starting import Ready, check_start, preflight_now
 from server.flying.upload_task import MadeUpload
 from server.flying.work import FlightWork

@@ -19,7 +19,7 @@ from planning.flight_time.predict import predict_duration
 from planning.formats.commands import has_position
 from planning.guided.guided_model import GuidedWay, Join
 from planning.missions.flown import flown_line
-from planning.missions.joining import Joining, joined_mission, joining
+from planning.missions.joined_mission import Joining, joined_mission, joining
 from planning.missions.mission_items import Place
 from planning.planner.part import FLIGHT_MARGIN_M, needed_part, rally_places
 from planning.terrain.dsm import Dsm

@@ -14,8 +14,8 @@ from telemetry.link.heartbeat import heartbeat
 from telemetry.link.line import Line
 from telemetry.link.onboard import OnBoard
 from telemetry.link.streams import StreamRequests
+from telemetry.link.ways.choosing import ChangeOver, Ways
 from telemetry.link.ways.way import Way
-from telemetry.link.ways.ways import ChangeOver, Ways
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.autopilot_orders import Order, Orders
 from telemetry.mavlink.believing import CLOCKED, MOTORS_DOUBTED, Believing

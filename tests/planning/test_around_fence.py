@@ -11,9 +11,9 @@ from pyproj import CRS
 from skimage import measure
 
 from planning.fence.fence_model import Fence, FenceCircle, FencePolygon, RallyPoint, circle, polygon
+from planning.fence.grown_zones import ROUNDING_M, Flat, zones_of
 from planning.fence.judge import FencedFlight, FenceVerdict, judge_fence
 from planning.fence.ways_around import field_of, way_around
-from planning.fence.zones import ROUNDING_M, Flat, zones_of
 from planning.route.around_fence import Kept, Laid, laid_legs
 from planning.terrain.dsm import Dsm
 from tests.reference.fence import nearest_m, plane_about, swept_places, xy_of

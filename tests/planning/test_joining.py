@@ -15,7 +15,7 @@ from planning.basics.mav_cmd import MavCmd
 from planning.basics.plan_model import Home, Mission, MissionItem
 from planning.errors import CapacityError, MissionError
 from planning.missions.flown import flown_line
-from planning.missions.joining import (
+from planning.missions.joined_mission import (
     ALIKE_M,
     HEADROOM_M,
     NEXT_M,

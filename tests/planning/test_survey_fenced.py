@@ -11,7 +11,7 @@ import pytest
 from planning.basics.plan_model import Poi
 from planning.errors import PoiError
 from planning.fence.fence_model import Fence, circle
-from planning.fence.zones import ROUNDING_M, Flat
+from planning.fence.grown_zones import ROUNDING_M, Flat
 from planning.ground.demo_hillside import demo_dsm, demo_survey_polygon
 from planning.missions.vehicle_profile import load_profile, path_params
 from planning.planner.plan import plan_mission

@@ -13,7 +13,7 @@ import numpy as np
 from server.flying.checklist_desk import ChecklistDesk
 from server.flying.checklists import Checklists
 from server.flying.flight_desk import FlightDesk
-from server.flying.in_flight.taking_up import TakingUp
+from server.flying.in_flight.take_up_desk import TakingUp
 from server.flying.work import FlightWork
 from server.heard.onboard import Aboard
 from server.library import Library

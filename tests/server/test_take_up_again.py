@@ -130,7 +130,7 @@ def test_what_is_seen_during_the_upload_counts(play: Play, monkeypatch: pytest.M
             looked.append(len([request for request in bench.vehicle.told if isinstance(request, Pause)]))
             return ()
 
-        monkeypatch.setattr("server.flying.in_flight.taking_up.seen_maps", maps)
+        monkeypatch.setattr("server.flying.in_flight.take_up_desk.seen_maps", maps)
         await bench.desk.take_up(ME, AGAIN)
         assert looked == [1, 1], "before it is made, and when it was read back"
 

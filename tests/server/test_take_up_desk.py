@@ -295,7 +295,7 @@ def test_one_that_does_not_come_to_rest_or_stands_on_the_ground_is_refused(
 ) -> None:
     async def scenario() -> None:
         bench = await flown(made, tmp_path, lanes, ground_speed_m_s=4.0)
-        monkeypatch.setattr("server.flying.in_flight.taking_up.HOLDS_WITHIN_S", 0.3)
+        monkeypatch.setattr("server.flying.in_flight.take_up_desk.HOLDS_WITHIN_S", 0.3)
         with pytest.raises(SilentError, match="does not stand still") as moves:
             await bench.desk.take_up(ME, TakeUpPlan(revision=3))
         assert "does not stand still yet, and the mission before is still on board" in moves.value.advice

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from telemetry.link.ways.ways import SETTLE_S
+from telemetry.link.ways.choosing import SETTLE_S
 from tests.telemetry.way_carriers import LTE, TICK_S, WIFI, Carrier, Field
 
 

@@ -12,7 +12,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import NotAllowedError
-from telemetry.link.ways.ways import SETTLE_S
+from telemetry.link.ways.choosing import SETTLE_S
 from telemetry.simulation.simulator.autopilot.flight_modes import Hold
 from telemetry.simulation.simulator.run import SimOptions, Simulator, flying
 from telemetry.topics.link_ways import WayStatus

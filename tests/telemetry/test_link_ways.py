@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from telemetry.link.ways.choosing import SETTLE_S, Ways
 from telemetry.link.ways.way import SILENT_S, TELLS_S, Way
-from telemetry.link.ways.ways import SETTLE_S, Ways
 from telemetry.topics.messages import LOST_S, STALE_S
 from tests.telemetry.frames import attitude, heard, heartbeat
 from tests.telemetry.way_carriers import LTE, RADIO, TICK_S, WIFI, Carrier, Field, candidate

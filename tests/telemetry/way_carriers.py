@@ -8,7 +8,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from telemetry.link.ways.ways import ChangeOver, Ways
+from telemetry.link.ways.choosing import ChangeOver, Ways
 from telemetry.topics.messages import Candidate
 from tests.telemetry.frames import attitude, heard
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from planning.basics.plan_model import Firmware, Mission
 from planning.certificate.as_json import certificate_json
 from planning.formats.wpl import read_wpl, write_wpl
-from planning.missions.joining import as_planned, common_places
+from planning.missions.joined_mission import as_planned, common_places
 from planning.missions.vehicle_profile import dump_profile
 from planning.planner.request import effective_profile
 from server.flying.in_flight.way_task import with_seen
