@@ -29,7 +29,7 @@ NEAR_M = 1e-4
 
 
 @dataclass(frozen=True, slots=True)
-class Zone:
+class GrownZone:
     """One convex piece: the intersection of half-planes ``normals @ place <= offsets_m``."""
 
     shape: str
@@ -92,7 +92,7 @@ def flat_shapes(fence: Fence, plane: HomePlane, flown_m: float) -> list[Flat]:
     return [_flat(name, each, plane, flown_m) for name, each in named if plane.reach_m(each) <= FARTHEST_M]
 
 
-def zones_of(flat: Flat, margin_m: float, stands_m: F64) -> list[Zone]:
+def zones_of(flat: Flat, margin_m: float, stands_m: F64) -> list[GrownZone]:
     """Its pieces; none of an inclusion circle. Places ``stands_m`` that keep the margin are outside of them."""
     if len(flat.corners_m) == 1:
         cores = [] if flat.inclusion else [flat.corners_m]
@@ -119,7 +119,7 @@ def disc_of(flat: Flat, margin_m: float, stands_m: F64) -> Disc | None:
     return Disc(flat.name, flat.corners_m[0], flat.radius_m - kept_m(flat, margin_m, stands_m))
 
 
-def shadow(zone: Zone, from_m: F64) -> tuple[F64, F64] | None:
+def shadow(zone: GrownZone, from_m: F64) -> tuple[F64, F64] | None:
     """Normals and offsets of all places that do not see ``from_m`` past the zone; None: it stands within the zone."""
     front = zone.normals @ from_m > zone.offsets_m - NEAR_M / 10
     if not front.any():
@@ -156,7 +156,7 @@ def _is_convex(corners_m: F64) -> bool:
     return bool((edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0] >= 0.0).all())
 
 
-def _grown(shape: str, core_m: F64, grown_m: float, least_m: float, stands_m: F64) -> Zone:
+def _grown(shape: str, core_m: F64, grown_m: float, least_m: float, stands_m: F64) -> GrownZone:
     zone = _with_sides(shape, core_m, grown_m, _round_rad(core_m))
     within = (stands_m @ zone.normals.T <= zone.offsets_m + NEAR_M).all(axis=1)
     if not within.any():
@@ -168,7 +168,7 @@ def _grown(shape: str, core_m: F64, grown_m: float, least_m: float, stands_m: F6
     return _with_sides(shape, core_m, grown_m, np.concatenate([_round_rad(core_m), facing_rad]))
 
 
-def _with_sides(shape: str, core_m: F64, grown_m: float, facing_rad: F64) -> Zone:
+def _with_sides(shape: str, core_m: F64, grown_m: float, facing_rad: F64) -> GrownZone:
     """The core grown, with a side that faces each of these directions."""
     facing_rad = np.sort(facing_rad % math.tau)
     apart = np.diff(facing_rad, append=facing_rad[0] + math.tau) > SAME_RAD
@@ -179,7 +179,7 @@ def _with_sides(shape: str, core_m: F64, grown_m: float, facing_rad: F64) -> Zon
     turn = normals[:, 0] * after[:, 1] - normals[:, 1] * after[:, 0]
     x = (offsets_m * after[:, 1] - after_m * normals[:, 1]) / turn
     y = (after_m * normals[:, 0] - offsets_m * after[:, 0]) / turn
-    return Zone(shape, normals, offsets_m, np.column_stack([x, y]))
+    return GrownZone(shape, normals, offsets_m, np.column_stack([x, y]))
 
 
 def _round_rad(core_m: F64) -> F64:

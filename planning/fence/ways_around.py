@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from mapping.geometry.arrays import F64, I64
-from planning.fence.grown_zones import Disc, Zone, shadow
+from planning.fence.grown_zones import Disc, GrownZone, shadow
 
 TOUCHES_M = 1e-6
 """A way along a side does not enter."""
@@ -27,7 +27,7 @@ SHORTEST_M = 0.02
 class Field:
     """Zones, and what hides behind them."""
 
-    zones: tuple[Zone, ...]
+    zones: tuple[GrownZone, ...]
     owner: I64
     """(B,) the zone of each blocked set."""
     normals: F64
@@ -66,7 +66,7 @@ class WayAround:
 
 
 def field_of(
-    zones: Sequence[Zone], discs: Sequence[Disc], seen_from_m: F64, allowed: Callable[[F64], np.ndarray]
+    zones: Sequence[GrownZone], discs: Sequence[Disc], seen_from_m: F64, allowed: Callable[[F64], np.ndarray]
 ) -> Field | None:
     """With ``seen_from_m`` (T, 2) also what does not see each of these places straight is blocked; None: one is
     within a zone. A way turns inside every disc, where ``allowed``."""
@@ -109,7 +109,7 @@ def way_around(field: Field, from_m: F64, to_m: F64) -> WayAround:
     return WayAround(way_m[1:-1][keep], tuple(s for s, k in zip(shapes, keep, strict=True) if k), ())
 
 
-def _turns(zones: Sequence[Zone], discs: Sequence[Disc], allowed: Callable[[F64], np.ndarray]) -> tuple:
+def _turns(zones: Sequence[GrownZone], discs: Sequence[Disc], allowed: Callable[[F64], np.ndarray]) -> tuple:
     if not zones:
         return ()
     corners_m = np.vstack([zone.corners_m for zone in zones])

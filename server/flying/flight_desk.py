@@ -17,7 +17,7 @@ from server.flying.apart.other_vehicles import PENDING
 from server.flying.check_task import Checked
 from server.flying.checklist_desk import ChecklistDesk
 from server.flying.in_flight.take_up_desk import FIRMWARES, TakingUp, with_words
-from server.flying.in_flight.take_up_task import Asked, MadeTakeUp
+from server.flying.in_flight.take_up_task import AskedTakeUp, MadeTakeUp
 from server.flying.starting import Ready, check_start, preflight_now
 from server.flying.upload_task import MadeUpload
 from server.flying.work import FlightWork
@@ -242,7 +242,7 @@ class FlightDesk:
         self._checklist.check(body.digest)
         return ready
 
-    async def _put_on_board(self, operator: Operator, asked: Asked, made: MadeTakeUp) -> None:
+    async def _put_on_board(self, operator: Operator, asked: AskedTakeUp, made: MadeTakeUp) -> None:
         """Only what was read back, and certified as such, is taken up."""
         for kind, items in made.places.items():
             self._taking_up.sends(places=True)

@@ -35,7 +35,7 @@ from telemetry.topics.vehicle import VehicleState
 
 
 @dataclass(frozen=True, slots=True)
-class Over:
+class FlownOver:
     """The surface that is flown over."""
 
     ground: Dsm
@@ -72,7 +72,7 @@ class TakenUp:
 
 
 def taken_up(
-    over: Over, planned: Mission, state: VehicleState, flown: Flown, *, flown_items: int, now_s: float
+    over: FlownOver, planned: Mission, state: VehicleState, flown: Flown, *, flown_items: int, now_s: float
 ) -> TakenUp:
     """The way from where the vehicle hovers into a plan, and the rest of it. Takes up to seconds: for a worker.
 
@@ -96,7 +96,7 @@ def taken_up(
 
 
 def certified_on_board(
-    over: Over, onboard: OnboardMission, firmware: Firmware, state: VehicleState, flown: Flown
+    over: FlownOver, onboard: OnboardMission, firmware: Firmware, state: VehicleState, flown: Flown
 ) -> Certificate:
     """Of what was read back. Raises NotAllowedError, MissionError."""
     home = _home(state, over.ground)
@@ -126,7 +126,7 @@ def _certified(part: _Part, mission: Mission, clearance: ClearanceParams) -> Cer
     return certificate
 
 
-def _part(over: Over, xy_m: F64) -> _Part:
+def _part(over: FlownOver, xy_m: F64) -> _Part:
     ground = needed_part(over.ground, xy_m, FLIGHT_MARGIN_M)
     filled, _ = fill_holes(ground)
     if over.seen is None:

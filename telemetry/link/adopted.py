@@ -15,7 +15,7 @@ from telemetry.link.line import Line
 from telemetry.link.onboard import OnBoard
 from telemetry.link.streams import StreamRequests
 from telemetry.link.ways.choosing import ChangeOver, Ways
-from telemetry.link.ways.way import Way
+from telemetry.link.ways.way import LinkWay
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.autopilot_orders import Order, Orders
 from telemetry.mavlink.believing import CLOCKED, MOTORS_DOUBTED, Believing
@@ -145,7 +145,7 @@ class AdoptedVehicle:
         if way is not None and self.ways.has_several:
             way.gone()
 
-    def part_ways(self) -> list[Way]:
+    def part_ways(self) -> list[LinkWay]:
         """Those that turned out to lead to another vehicle, or that nobody can tell of."""
         self.ways.lapse(self._clock())
         parted = self.ways.part(self._clock())
@@ -176,7 +176,7 @@ class AdoptedVehicle:
             self.candidate = self.ways.chosen.candidate
         return True
 
-    def _may_be_left(self, way: Way, now_s: float) -> bool:
+    def _may_be_left(self, way: LinkWay, now_s: float) -> bool:
         """When all others are silent."""
         if way.is_lost(now_s):
             return self.ways.has_other_known(way.address)
@@ -198,7 +198,7 @@ class AdoptedVehicle:
         self._telling.ordered(message)
         self._send_over(self.ways.chosen, message)
 
-    def _send_over(self, way: Way, message: Message) -> None:
+    def _send_over(self, way: LinkWay, message: Message) -> None:
         frame = self._lines[way.address].send(message, way.candidate.peer)
         if frame is None:
             return

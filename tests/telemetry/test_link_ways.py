@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.link.ways.choosing import SETTLE_S, Ways
-from telemetry.link.ways.way import SILENT_S, TELLS_S, Way
+from telemetry.link.ways.way import SILENT_S, TELLS_S, LinkWay
 from telemetry.topics.messages import LOST_S, STALE_S
 from tests.telemetry.frames import attitude, heard, heartbeat
 from tests.telemetry.way_carriers import LTE, RADIO, TICK_S, WIFI, Carrier, Field, candidate
@@ -266,7 +266,7 @@ def test_with_one_way_everything_counts() -> None:
 
 
 def test_what_is_shown_of_a_way() -> None:
-    way = Way(candidate(RADIO), identity="known")
+    way = LinkWay(candidate(RADIO), identity="known")
     assert way.status(0.0, in_use=False).silent_s is None
     for sequence in (0, 1, 4):
         way.hear(heard(attitude(), sequence=sequence), 1.0)

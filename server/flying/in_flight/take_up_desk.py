@@ -11,7 +11,7 @@ from typing import Literal, TypeVar
 from planning.errors import DescribedError
 from planning.missions.vehicle_profile import parse_profile
 from server.errors import NotReadyError
-from server.flying.in_flight.take_up_task import Asked, MadeTakeUp, check_take_up, make_take_up
+from server.flying.in_flight.take_up_task import AskedTakeUp, MadeTakeUp, check_take_up, make_take_up
 from server.flying.work import check_uploadable
 from server.heard.channel import Channel
 from server.heard.onboard import Aboard
@@ -102,7 +102,7 @@ class TakingUp:
             await asyncio.sleep(LOOK_EVERY_S)
             still_s = still_s + LOOK_EVERY_S if _holds(self._state()) else 0.0
 
-    async def made(self, operator: Operator, body: TakeUpPlan) -> tuple[Asked, MadeTakeUp]:
+    async def made(self, operator: Operator, body: TakeUpPlan) -> tuple[AskedTakeUp, MadeTakeUp]:
         """Nothing is sent."""
         plan = self._workspace.state
         check_uploadable(plan, body.revision)
@@ -115,7 +115,7 @@ class TakingUp:
         if before is not None and before.terrain_sha256 != terrain.sha256:
             what = f'The plan is over "{terrain.name}", the vehicle took off over "{before.terrain_name}".'
             raise NotAllowedError(what, where="surface model", advice="Plan over the model that the flight began over.")
-        asked = Asked(
+        asked = AskedTakeUp(
             self._library.terrain_dir(terrain.id),
             document,
             terrain.name,
@@ -135,7 +135,7 @@ class TakingUp:
             raise NotAllowedError(battery.text, where="battery", advice=battery.mend)
         return asked, made
 
-    async def certificate(self, operator: Operator, asked: Asked, onboard: OnboardMission) -> str:
+    async def certificate(self, operator: Operator, asked: AskedTakeUp, onboard: OnboardMission) -> str:
         """Of what was read back, as JSON."""
         aboard, maps = await self._places(operator), await asyncio.to_thread(seen_maps, self._watch)
         now = replace(asked, state=self._state(), now_mono_s=time.monotonic(), aboard=aboard, maps=maps)

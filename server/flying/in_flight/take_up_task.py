@@ -31,11 +31,11 @@ from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:
     from telemetry.flight.certified_way import Flown
-    from telemetry.flight.taking_up import Over, TakenUp
+    from telemetry.flight.taking_up import FlownOver, TakenUp
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class AskedTakeUp:
     """All that it is judged by, of one moment."""
 
     directory: Path
@@ -67,7 +67,7 @@ class MadeTakeUp:
     """lat_deg, lon_deg, alt_rel_home_m"""
 
 
-def make_take_up(asked: Asked, *, report: Progress) -> MadeTakeUp:
+def make_take_up(asked: AskedTakeUp, *, report: Progress) -> MadeTakeUp:
     """Of the plan that was computed last. Raises NotAllowedError, PlanningError."""
     from telemetry.flight.taking_up import taken_up
     from telemetry.mavlink.items import items_from_mission
@@ -103,7 +103,7 @@ def make_take_up(asked: Asked, *, report: Progress) -> MadeTakeUp:
     return MadeTakeUp(items_from_mission(read_wpl(text)), record, sent, _doc(found), found.begins)
 
 
-def check_take_up(asked: Asked, onboard: OnboardMission, *, report: Progress) -> str:
+def check_take_up(asked: AskedTakeUp, onboard: OnboardMission, *, report: Progress) -> str:
     """Of what was read back, with the fence and rally points that are on board by now: its certificate as JSON.
 
     Raises NotAllowedError, PlanningError.
@@ -132,7 +132,7 @@ def _flown_items(before: PlanRecord, planned: Mission, next_item: int) -> int:
     return common_places(flown, planned, next_item=next_item)
 
 
-def _sent(asked: Asked, firmware: Firmware) -> dict[PlaceList, tuple[Item, ...]]:
+def _sent(asked: AskedTakeUp, firmware: Firmware) -> dict[PlaceList, tuple[Item, ...]]:
     """Fence and rally points of the plan, and nothing in place of those that only the plan before had."""
     from telemetry.flight.preflight.fence_check import NOTHING, sent_places
     from telemetry.mavlink.verify import compare
@@ -147,7 +147,7 @@ def _sent(asked: Asked, firmware: Firmware) -> dict[PlaceList, tuple[Item, ...]]
     return sent
 
 
-def _flown(asked: Asked, aboard: PlacesOnboard) -> Flown:
+def _flown(asked: AskedTakeUp, aboard: PlacesOnboard) -> Flown:
     from telemetry.flight.certified_way import Flown
     from telemetry.flight.preflight.fence_check import flown_within
 
@@ -159,13 +159,13 @@ def _flown(asked: Asked, aboard: PlacesOnboard) -> Flown:
     return Flown(demands.profile, demands.clearance(), asked.parameters, fence, rally)
 
 
-def _over(asked: Asked) -> Over:
+def _over(asked: AskedTakeUp) -> FlownOver:
     from telemetry.flight.home_height import check_home_height
-    from telemetry.flight.taking_up import Over
+    from telemetry.flight.taking_up import FlownOver
 
     ground = load_terrain(asked.directory)
     check_home_height(ground, asked.took_off, asked.state)
-    return Over(ground, with_seen(ground, asked.directory, asked.document.seen_id, asked.maps, asked.state))
+    return FlownOver(ground, with_seen(ground, asked.directory, asked.document.seen_id, asked.maps, asked.state))
 
 
 def _doc(found: TakenUp) -> TakenUpDoc:

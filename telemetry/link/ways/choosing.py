@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import count
 
 from telemetry.link.ways.copies import ANSWERS, Copies
-from telemetry.link.ways.way import UNANSWERED, Way
+from telemetry.link.ways.way import UNANSWERED, LinkWay
 from telemetry.mavlink.actions import Message
 from telemetry.topics.link_ways import WayStatus
 from telemetry.topics.messages import Candidate
@@ -38,18 +38,18 @@ class Ways:
     def __init__(self, candidate: Candidate, now_s: float) -> None:
         """``candidate``: the vehicle, where it was adopted."""
         self._numbers = count(1)
-        self.chosen = Way(candidate, identity="known")
+        self.chosen = LinkWay(candidate, identity="known")
         self.chosen.heard_s = now_s
         self._ways = {candidate.address: self.chosen}
         self._copies = Copies()
         self._asked_s = -ASK_EVERY_S
-        self._better: tuple[Way, float] | None = None
+        self._better: tuple[LinkWay, float] | None = None
         """Which way has been better than the one in use, and since when."""
 
-    def __iter__(self) -> Iterator[Way]:
+    def __iter__(self) -> Iterator[LinkWay]:
         return iter(self._ways.values())
 
-    def get(self, address: str) -> Way | None:
+    def get(self, address: str) -> LinkWay | None:
         return self._ways.get(address)
 
     @property
@@ -68,7 +68,7 @@ class Ways:
     def add(self, candidate: Candidate) -> None:
         """Who has the vehicle's numbers there; until its clock has been compared nothing of it is used."""
         if candidate.address != self.chosen.address:
-            self._ways[candidate.address] = Way(candidate, identity="asked", number=next(self._numbers))
+            self._ways[candidate.address] = LinkWay(candidate, identity="asked", number=next(self._numbers))
 
     def remove(self, address: str, now_s: float) -> ChangeOver | None:
         """Not the last one that is known."""
@@ -109,7 +109,7 @@ class Ways:
             if way is not other and witness.identity == "known":
                 judged.judge(witness, reading.asked_ns, now_s)
 
-    def on_tick(self, now_s: float) -> list[tuple[Way, Message]]:
+    def on_tick(self, now_s: float) -> list[tuple[LinkWay, Message]]:
         """Questions, each to be sent over its way: all at once, so that the answers can be compared."""
         if now_s - self._asked_s < ASK_EVERY_S:
             return []
@@ -124,7 +124,7 @@ class Ways:
                 if way.identity == "known" and not self.chosen.is_lost(now_s):
                     way.doubt()
 
-    def part(self, now_s: float) -> list[Way]:
+    def part(self, now_s: float) -> list[LinkWay]:
         """Ways that turned out to be another vehicle's, or that nothing can be compared with any more: taken out."""
         lost = all(way.is_lost(now_s) for way in self if way.identity == "known")
         out = [way for way in self if way.identity == "other" or (way.identity == "asked" and lost)]
@@ -151,7 +151,7 @@ class Ways:
             return self._change(best, f"{self.chosen.clock.unanswered(now_s)} questions went unanswered", is_loss=True)
         return self._settle(best, now_s)
 
-    def _settle(self, best: Way, now_s: float) -> ChangeOver | None:
+    def _settle(self, best: LinkWay, now_s: float) -> ChangeOver | None:
         before_s, now_cost_s = self.chosen.cost_s(now_s), best.cost_s(now_s)
         if now_cost_s >= BETTER * before_s - BETTER_S or now_cost_s == float("inf"):
             self._better = None
@@ -162,7 +162,7 @@ class Ways:
             return None
         return self._change(best, _worse(self.chosen, best, now_s), is_loss=False)
 
-    def _change(self, way: Way, why: str, *, is_loss: bool) -> ChangeOver:
+    def _change(self, way: LinkWay, why: str, *, is_loss: bool) -> ChangeOver:
         before, self.chosen = self.chosen, way
         # What the way before brought may be said again: once too often is better than a real repetition unheard.
         self._better, self._copies = None, Copies()
@@ -176,11 +176,11 @@ def _silence(silent_s: float) -> str:
     return "the far end hung up" if silent_s == float("inf") else f"it has been silent for {silent_s:.1f} s"
 
 
-def _worse(before: Way, now: Way, now_s: float) -> str:
+def _worse(before: LinkWay, now: LinkWay, now_s: float) -> str:
     return f"this one is better, {_figures(now, now_s)} instead of {_figures(before, now_s)}"
 
 
-def _figures(way: Way, now_s: float) -> str:
+def _figures(way: LinkWay, now_s: float) -> str:
     share, round_trip_s = way.quality.share(now_s), way.round_trip_s(now_s)
     loss = "nothing heard" if share is None else f"{100 * (1 - share):.0f} % lost"
     return loss if round_trip_s is None else f"{loss} and {1000 * round_trip_s:.0f} ms"

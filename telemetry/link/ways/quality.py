@@ -51,7 +51,7 @@ class SequenceQuality:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class ClockReading:
     """One answer to a question that went out at ``asked_ns`` on our clock."""
 
     asked_ns: int
@@ -73,7 +73,7 @@ class RoundTripClock:
         self.answered_s = float("-inf")
         """When the last answer came."""
         self._answered_ns = 0
-        self._asked: dict[int, Reading | None] = {}
+        self._asked: dict[int, ClockReading | None] = {}
 
     def ask(self, now_s: float) -> Message:
         asked_ns = int(now_s * 1e9)
@@ -82,7 +82,7 @@ class RoundTripClock:
             del self._asked[next(iter(self._asked))]
         return mavlink.MAVLink_timesync_message(0, asked_ns + self._number)
 
-    def reading(self, asked_ns: int) -> Reading | None:
+    def reading(self, asked_ns: int) -> ClockReading | None:
         return self._asked.get(asked_ns)
 
     def share(self, now_s: float) -> float | None:
@@ -113,7 +113,7 @@ class RoundTripClock:
         """What was asked before this may count as unanswered."""
         return now_s - min(max(DUE_S, 2 * (self.round_trip_s or 0.0)), DUE_LIMIT_S)
 
-    def on_message(self, message: Message, now_s: float) -> Reading | None:
+    def on_message(self, message: Message, now_s: float) -> ClockReading | None:
         """The first answer to a question of ours."""
         if message.get_type() != "TIMESYNC" or message.tc1 == 0:
             return None
@@ -126,7 +126,7 @@ class RoundTripClock:
             return None
         self.round_trip_s, self.answered_s = taken_s, now_s
         self._answered_ns = max(asked_ns, self._answered_ns)
-        self._asked[asked_ns] = reading = Reading(asked_ns, taken_s, message.tc1 / 1e9 - asked_s - taken_s / 2)
+        self._asked[asked_ns] = reading = ClockReading(asked_ns, taken_s, message.tc1 / 1e9 - asked_s - taken_s / 2)
         return reading
 
 

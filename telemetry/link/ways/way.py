@@ -7,7 +7,7 @@ and each answer is wrong by half its round trip at most. Positions, where both w
 from __future__ import annotations
 
 from mapping.geometry.frames import apart_m
-from telemetry.link.ways.quality import Reading, RoundTripClock, SequenceQuality
+from telemetry.link.ways.quality import ClockReading, RoundTripClock, SequenceQuality
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.reduce import lat_lon
 from telemetry.topics.link_ways import RadioSignal, WayIdentity, WayStatus
@@ -38,7 +38,7 @@ PROMPT_S = 2.0
 """What a spare way brings counts while its last answer is younger than this, and took no longer."""
 
 
-class Way:
+class LinkWay:
     """``identity`` "asked": by its numbers it is the vehicle, by its clock it is not known yet to be."""
 
     def __init__(self, candidate: Candidate, *, identity: WayIdentity, number: int = 0) -> None:
@@ -56,7 +56,7 @@ class Way:
     def address(self) -> str:
         return self.candidate.address
 
-    def hear(self, message: Message, now_s: float) -> Reading | None:
+    def hear(self, message: Message, now_s: float) -> ClockReading | None:
         """A message of the vehicle's autopilot that came over this way."""
         reading = self.clock.on_message(message, now_s)
         if self.is_silent(now_s):
@@ -121,7 +121,7 @@ class Way:
         """It is asked anew, as one that was never known."""
         self.identity, self._agreed, self._differed = "asked", 0, 0
 
-    def judge(self, witness: Way, asked_ns: int, now_s: float) -> None:
+    def judge(self, witness: LinkWay, asked_ns: int, now_s: float) -> None:
         """Held against one that is known to be the vehicle's, by the question that both were asked at once."""
         same = self._is_same(witness, asked_ns, now_s)
         if same is None:
@@ -132,7 +132,7 @@ class Way:
         elif self._agreed >= AGREES and self.identity != "other":
             self.identity, self.has_lapsed, witness.has_lapsed = "known", False, False
 
-    def _is_same(self, witness: Way, asked_ns: int, now_s: float) -> bool | None:
+    def _is_same(self, witness: LinkWay, asked_ns: int, now_s: float) -> bool | None:
         ours, theirs = self.clock.reading(asked_ns), witness.clock.reading(asked_ns)
         if ours is None or theirs is None:
             return None
@@ -141,7 +141,7 @@ class Way:
             return None
         return abs(ours.ahead_s - theirs.ahead_s) <= both_s / 2 + SLACK_S and not self._is_far(witness, now_s)
 
-    def _is_far(self, witness: Way, now_s: float) -> bool:
+    def _is_far(self, witness: LinkWay, now_s: float) -> bool:
         ours, theirs = self._place, witness._place
         if ours is None or theirs is None or now_s - min(ours[1], theirs[1]) > FRESH_S:
             return False

@@ -16,7 +16,7 @@ import numpy as np
 from mapping.geometry.arrays import F32, F64
 from telemetry.errors import RecordingError
 from telemetry.recording.ros.bag import BagContents
-from telemetry.recording.ros.transforms import Gap, Track, Transform, Way, track_of, tree_of
+from telemetry.recording.ros.transforms import FrameTrack, FrameWay, Gap, Transform, track_of, tree_of
 
 BASE_LINK = "base_link"
 """REP 105: the robot's own frame."""
@@ -89,8 +89,8 @@ class _Robot:
     world: str
     base: str
     pose_at: Callable[[int, int], Transform | Gap]
-    tracks: tuple[Track, ...]
-    way_to_base: Callable[[str], Way | None]
+    tracks: tuple[FrameTrack, ...]
+    way_to_base: Callable[[str], FrameWay | None]
 
     @classmethod
     def of(cls, contents: BagContents, base: str | None, *, from_transforms: bool) -> _Robot:
@@ -154,7 +154,7 @@ def _listed(names: Sequence[str]) -> str:
     return f"frames of the bag: {', '.join(names[:_MOST_LISTED]) or 'none'}"
 
 
-def _check_moves(way: Way, world: str, base: str, names: Sequence[str]) -> None:
+def _check_moves(way: FrameWay, world: str, base: str, names: Sequence[str]) -> None:
     """Where each transform above the robot is static, or there is none, every cloud would be seen from one place."""
     if any(not track.is_static for track in way.rising):
         return
@@ -165,7 +165,7 @@ def _check_moves(way: Way, world: str, base: str, names: Sequence[str]) -> None:
     )
 
 
-def _chosen_pose(track: Track, own_from_chosen: Way, t_ns: int, most_gap_ns: int) -> Transform | Gap:
+def _chosen_pose(track: FrameTrack, own_from_chosen: FrameWay, t_ns: int, most_gap_ns: int) -> Transform | Gap:
     """Of the frame that was chosen, by the poses of another one."""
     pose, moved = track.at(t_ns, most_gap_ns), own_from_chosen.at(t_ns, most_gap_ns)
     if isinstance(pose, Gap) or isinstance(moved, Gap):
@@ -176,7 +176,7 @@ def _chosen_pose(track: Track, own_from_chosen: Way, t_ns: int, most_gap_ns: int
 def _clouds(
     contents: BagContents, robot: _Robot, origin_m: F64, most_gap_ns: int, gaps: Counter[Gap]
 ) -> Iterator[PlacedCloud]:
-    ways: dict[int, Way | None] = {}
+    ways: dict[int, FrameWay | None] = {}
     for stamp, first, count, frame in contents.frames.tolist():
         if frame not in ways:
             ways[frame] = robot.way_to_base(contents.names[frame])

@@ -21,7 +21,7 @@ from telemetry.errors import RecordingError
 from telemetry.recording.mcap_files.foxglove import enu_from_body_quaternion
 from telemetry.recording.mcap_files.reader import Recording, open_recording
 from telemetry.recording.ros.ros2_writer import Ros2Writer
-from telemetry.recording.ros.transforms import Gap, Track
+from telemetry.recording.ros.transforms import FrameTrack, Gap
 from telemetry.topics.messages import Topic
 from telemetry.topics.vehicle import VehicleState
 
@@ -80,7 +80,7 @@ def _pose_writer(stamp_ns: int, p_enu_m: F64, q_wxyz: F64) -> _Write:
     return write
 
 
-def _attitudes(states: list[VehicleState], shift_s: float) -> Track | None:
+def _attitudes(states: list[VehicleState], shift_s: float) -> FrameTrack | None:
     found: dict[int, tuple[float, float, float, float]] = {}
     for state in states:
         roll, pitch, heading = state.roll_rad, state.pitch_rad, state.heading_rad
@@ -90,7 +90,7 @@ def _attitudes(states: list[VehicleState], shift_s: float) -> Track | None:
         found[_ns(state.attitude_t_mono_s - shift_s)] = (w, x, y, z)
     stamps = np.array(sorted(found), np.int64)
     turns = np.array([found[stamp] for stamp in stamps.tolist()], np.float64)
-    return Track(HOME, BASE, stamps, np.zeros((len(stamps), 3)), turns) if found else None
+    return FrameTrack(HOME, BASE, stamps, np.zeros((len(stamps), 3)), turns) if found else None
 
 
 def _home(state: VehicleState) -> tuple[float, float, float] | None:

@@ -55,7 +55,7 @@ class Gap:
 
 
 @dataclass(frozen=True, slots=True)
-class Track:
+class FrameTrack:
     """One frame in its parent, over time; a static one has one sample that always holds."""
 
     parent: str
@@ -86,21 +86,21 @@ class Track:
         return shift, quaternions.slerp(self.q_wxyz[after - 1], self.q_wxyz[after], share)
 
 
-def track_of(rows: NDArray[np.void], parent: str, child: str, *, is_static: bool = False) -> Track:
+def track_of(rows: NDArray[np.void], parent: str, child: str, *, is_static: bool = False) -> FrameTrack:
     """Of rows of ``bag_types.TRANSFORM`` in any order; of two with the same stamp the later one holds."""
     newest_first = rows[::-1]
     _, chosen = np.unique(newest_first["stamp_ns"], return_index=True)
     chosen = chosen[-1:] if is_static else chosen
     found = newest_first[chosen]
-    return Track(parent, child, found["stamp_ns"], found["xyz_m"], found["q_wxyz"], is_static)
+    return FrameTrack(parent, child, found["stamp_ns"], found["xyz_m"], found["q_wxyz"], is_static)
 
 
 class TransformTree:
     """All frames of a bag."""
 
-    def __init__(self, tracks: Sequence[Track]) -> None:
+    def __init__(self, tracks: Sequence[FrameTrack]) -> None:
         """Raises RecordingError where a frame has several parents, or is its own ancestor."""
-        self._above: dict[str, Track] = {}
+        self._above: dict[str, FrameTrack] = {}
         for track in tracks:
             other = self._above.setdefault(track.child, track)
             if other.parent != track.parent:
@@ -123,7 +123,7 @@ class TransformTree:
             found.append(track.parent)
         return found
 
-    def way(self, target: str, source: str) -> Way | None:
+    def way(self, target: str, source: str) -> FrameWay | None:
         """From points of ``source`` to ``target``; None where nothing connects them."""
         up, down = self.ancestors(source), self.ancestors(target)
         common = next((name for name in up if name in down), None)
@@ -131,15 +131,15 @@ class TransformTree:
             return None
         rising = [self._above[name] for name in up[: up.index(common)]]
         falling = [self._above[name] for name in down[: down.index(common)]]
-        return Way(tuple(rising), tuple(falling))
+        return FrameWay(tuple(rising), tuple(falling))
 
 
 @dataclass(frozen=True, slots=True)
-class Way:
+class FrameWay:
     """Through the tree: up from the source, and down to the target."""
 
-    rising: tuple[Track, ...]
-    falling: tuple[Track, ...]
+    rising: tuple[FrameTrack, ...]
+    falling: tuple[FrameTrack, ...]
 
     def at(self, t_ns: int, most_gap_ns: int) -> Transform | Gap:
         common_from_source = _chained(self.rising, t_ns, most_gap_ns)
@@ -151,7 +151,7 @@ class Way:
         return common_from_target.inverse @ common_from_source
 
 
-def _chained(tracks: Sequence[Track], t_ns: int, most_gap_ns: int) -> Transform | Gap:
+def _chained(tracks: Sequence[FrameTrack], t_ns: int, most_gap_ns: int) -> Transform | Gap:
     """From the first track's child to the last one's parent."""
     whole = UNMOVED
     for track in tracks:
