@@ -245,8 +245,9 @@ def test_what_a_stalled_way_held_back_is_not_taken_for_something_new() -> None:
     field_ = Field(wifi=Carrier(), lte=Carrier())
     field_.run(5.0)
     carrier, said = field_.carriers[LTE], heard(mavlink.MAVLink_mission_ack_message(255, 190, 0))
-    carrier.delay_s = 4.0
-    field_.run(4.0)
+    carrier.delay_s = 2.8
+    field_.run(2.7)
+    assert field_.ways.is_known(LTE)
     assert not field_.ways.takes(LTE, said, field_.now_s)
     assert field_.ways.takes(WIFI, said, field_.now_s)
     field_.run(10.0)
