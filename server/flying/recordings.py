@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
+import time
 from pathlib import Path
 
 from server.errors import InUseError, reported
@@ -75,25 +77,35 @@ class Recording:
 
     def __init__(self, vehicle: int, folder: Path, shelf: RecordingShelf, nodes: Nodes, pages: Pages) -> None:
         self._vehicle, self._folder, self._shelf, self._nodes, self._pages = vehicle, folder, shelf, nodes, pages
-        self._look_again = False
+        self._look_again, self._started_mono_s = False, -math.inf
         self.status: RecorderStatus | None = None
 
     def on_status(self, status: RecorderStatus) -> None:
         before, self.status = self.status, status
         self._pages.publish(RecorderMessage(recorder=status))
         changed = before is None or (before.recording, before.name) != (status.recording, status.name)
-        if changed:
-            self._shelf.being_written.pop(self._vehicle, None)
-            if status.recording and status.name is not None:
-                self._shelf.being_written[self._vehicle] = self._folder / status.name
+        # One from before the recorder began does not know yet which file it writes.
+        if status.recording or status.t_mono_s > self._started_mono_s:
+            changed |= self._is_written(self._folder / status.name if status.recording and status.name else None)
         if changed or self._look_again:
             # A file that has just been ended gets its last part a moment later.
             self._look_again = changed
             self._shelf.changed.set()
 
+    def _is_written(self, path: Path | None) -> bool:
+        """Whether that is new."""
+        written = self._shelf.being_written
+        before = written.get(self._vehicle)
+        if path is not None:
+            written[self._vehicle] = path
+        elif before is not None:
+            del written[self._vehicle]
+        return path != before
+
     async def start(self) -> None:
         name = await self._nodes.ask_recorder(StartRecording())
         # Its file is there before its status is: it is neither listed nor deleted meanwhile.
+        self._started_mono_s = time.monotonic()
         self._shelf.being_written[self._vehicle] = self._folder / str(name)
         self._shelf.changed.set()
 

@@ -26,7 +26,7 @@ def test_a_fence_drawn_over_the_way_is_judged_at_once_and_undone(
     page.get_by_test_id("tool-fence_polygon").click()
     _click_corners(page, [(0.35, 0.35), (0.65, 0.35), (0.5, 0.65)])
     expect(page.get_by_test_id("fence-row")).to_have_count(1)
-    refused = page.get_by_test_id("error-box")
+    refused = page.get_by_test_id("panel-right").get_by_test_id("error-box")
     expect(refused).to_contain_text("inside exclusion polygon 1 of the fence")
     expect(page.get_by_test_id("verdict")).to_have_attribute("data-verdict", "error")
 

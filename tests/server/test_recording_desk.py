@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 from server.errors import StorageError
 from server.flying.recordings import Recording, RecordingDesk
+from telemetry.topics.messages import RecorderStatus
 from tests.server.fakes import Told
 
 
@@ -44,8 +46,18 @@ def test_a_recording_that_has_just_begun_counts_as_being_written_before_its_reco
     async def play() -> None:
         shelf: Any = SimpleNamespace(being_written={}, changed=asyncio.Event())
         nodes: Any = SimpleNamespace(ask_recorder=begins)
-        await Recording(2, Path("recordings"), shelf, nodes, Told()).start()
-        assert shelf.being_written == {2: Path("recordings/20260101T000000Z.mcap")}
+        recording = Recording(2, Path("recordings"), shelf, nodes, Told())
+        before_s = time.monotonic()
+        await recording.start()
+        written = {2: Path("recordings/20260101T000000Z.mcap")}
+        assert shelf.being_written == written
         assert shelf.changed.is_set()
+        # Under way since before it began; the first word of this recorder, so that it is news.
+        recording.on_status(RecorderStatus(before_s - 1.0, recording=False))
+        assert shelf.being_written == written
+        recording.on_status(RecorderStatus(time.monotonic(), recording=True, name="20260101T000000Z.mcap"))
+        assert shelf.being_written == written
+        recording.on_status(RecorderStatus(time.monotonic(), recording=False))
+        assert shelf.being_written == {}
 
     asyncio.run(play())
