@@ -43,7 +43,7 @@ def test_a_file_cut_anywhere_gives_a_beginning_of_what_was_recorded(whole: bytes
     try:
         found = all_entries(whole[:cut])
     except RecordingError:
-        assert cut < 3_000
+        assert cut < 5_000  # metadata and the channels of raw frames
         return
     assert found == SENT[: len(found)]
 
