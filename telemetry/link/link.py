@@ -211,7 +211,8 @@ class Link:
     def _heard(self, line: Line, source: Source, message: Message) -> None:
         now_s, t_utc_s = time.monotonic(), time.time()
         frame = bytes(message.get_msgbuf())
-        proof = self.keys.judge(source.system_id, message.get_msgId(), frame, now_s, way=source.way)
+        way, beside = self.peers.ways_of(source)
+        proof = self.keys.judge(source.system_id, message.get_msgId(), frame, now_s, way=way, beside=beside)
         if proof != "good":
             if proof == "replayed" and is_vehicle_heartbeat(message):
                 self._tell_time(line, source, now_s)

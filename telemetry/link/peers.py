@@ -132,6 +132,13 @@ class Peers:
         place = self._places.get(address)
         return None if place is None else place.candidate
 
+    def ways_of(self, source: Source) -> tuple[str, str]:
+        """Where a signed frame counts, and beside what: nobody else on its connection repeats what the vehicle sent
+        there, nor makes repetitions of the vehicle's own frames."""
+        place = self.place_at(source.address)
+        own = "" if place is None else f"{place.address}/{place.peer}"
+        return source.way if own in (source.way, "") else source.address, own
+
     def candidates(self, now_s: float) -> tuple[Candidate, ...]:
         fresh = (candidate for candidate, heard_s in self._heard.values() if now_s - heard_s < FORGET_S)
         places = [place.candidate for place in self._places.values()]

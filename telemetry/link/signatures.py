@@ -95,8 +95,11 @@ class KeyRing:
         keyed = None if system_id is None else self.of(system_id)
         return frame if keyed is None else keyed.signing.sign(frame, link=link, now=self._now)
 
-    def judge(self, system_id: int, message_id: int, frame: bytes, now_s: float, *, way: str = "") -> Verdict:
-        """ "good": it may be used; that is every message of a vehicle without a key. ``way``: where it came."""
+    def judge(
+        self, system_id: int, message_id: int, frame: bytes, now_s: float, *, way: str = "", beside: str = ""
+    ) -> Verdict:
+        """ "good": it may be used; that is every message of a vehicle without a key. ``way``, ``beside``: as in
+        ``Signing.verify``."""
         keyed = self.of(system_id)
         if keyed is None:
             if is_signed(frame):
@@ -104,7 +107,7 @@ class KeyRing:
             return "good"
         if keyed.mode == "let":
             return "good"  # whatever key it may have got since
-        verdict = keyed.signing.verify(frame, now=self._now, way=way)
+        verdict = keyed.signing.verify(frame, now=self._now, way=way, beside=beside)
         if verdict == "good":
             keyed.good_s = now_s
             if keyed.mode == "asked":

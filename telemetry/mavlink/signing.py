@@ -75,18 +75,18 @@ class Signing:
         signed += crc.crc.to_bytes(_CHECKSUM, "little") + bytes([link]) + self.newest.to_bytes(6, "little")
         return bytes(signed) + _hash(self.key, signed)
 
-    def verify(self, frame: bytes, *, now: int, way: str = "") -> Verdict:
+    def verify(self, frame: bytes, *, now: int, way: str = "", beside: str = "") -> Verdict:
         """Of a whole frame whose checksum holds. What is good is remembered; nothing else changes anything.
 
         ``way``: the connection that it came on, and who sent it there. Each brings every frame once, the slower one a
-        little later.
+        little later. ``beside``: another way whose frames are not to come once more over this one.
         """
         if not is_signed(frame) or len(frame) < _HEADER + _SIGNATURE:
             return "unsigned"
         if not hmac.compare_digest(_hash(self.key, frame[:-_HASH]), frame[-_HASH:]):
             return "wrong"
         stream, at = (frame[5], frame[6], frame[-_SIGNATURE]), int.from_bytes(frame[-12:-6], "little")
-        if self._is_replayed(stream, at, way, now):
+        if self._is_replayed(stream, at, (way, beside), now):
             return "replayed"
         if at > max(now, self.newest) + FARTHEST:
             return "ahead"
@@ -102,14 +102,14 @@ class Signing:
             oldest = {each: newest - COPY for each, newest in self.streams.items()}
             self._by_way = {key: at for key, at in self._by_way.items() if at >= oldest.get(key[0], 0)}
 
-    def _is_replayed(self, stream: Stream, at: int, way: str, now: int) -> bool:
+    def _is_replayed(self, stream: Stream, at: int, ways: tuple[str, str], now: int) -> bool:
         newest = self.streams.get(stream)
         if newest is None:
             return at + YOUNG < self.newest
         if at > newest:
             return False
-        before = max(self._by_way.get((stream, way), 0), self._floors.get(stream, 0))
-        is_full = (stream, way) not in self._by_way and len(self._by_way) >= MOST_WAYS
+        before = max(self._floors.get(stream, 0), *(self._by_way.get((stream, way), 0) for way in ways))
+        is_full = (stream, ways[0]) not in self._by_way and len(self._by_way) >= MOST_WAYS
         is_late = not 0 <= now - self._proven.get(stream, -COPY - 1) <= COPY
         return at <= before or at + COPY < newest or is_late or is_full
 
