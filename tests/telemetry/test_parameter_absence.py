@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from telemetry.errors import TransferError
-from telemetry.mavlink.parameters.absence import LinkEvidence
-from telemetry.mavlink.parameters.reading import LONGEST_S, ParameterRead
+from telemetry.mavlink.parameters.reading import LONGEST_S, LinkEvidence, ParameterRead
 from tests.telemetry.lossy import VEHICLE, Faults, Run
 from tests.telemetry.parameter_vehicles import KEPT_REQUESTS, ArduPilotParameters, Px4Parameters, ardupilot_table, table
 

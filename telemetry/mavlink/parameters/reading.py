@@ -10,7 +10,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from telemetry.errors import SilentError, TelemetryError, TransferError
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Send
 from telemetry.mavlink.conversation import RoundTrip
-from telemetry.mavlink.parameters.absence import LinkEvidence
 from telemetry.mavlink.parameters.values import parameter_value
 from telemetry.topics.parameters import NAME_BYTES
 
@@ -24,6 +23,30 @@ WINDOW = 15
 LONGEST_S = 20.0
 FIRST = 0
 """Number of a parameter that every vehicle has: whether it answers tells what its silence about a name means."""
+CERTAIN = 1e-4
+"""A name is absent when the chance that all questions for it were lost is smaller."""
+
+
+@dataclass(slots=True)
+class LinkEvidence:
+    """Questions that the vehicle had to answer: about what it surely has."""
+
+    answered: int = 0
+    missed: int = 0
+
+    def chance_of_silence(self, questions: int) -> float:
+        """That so many questions in a row are lost, whatever share the link loses.
+
+        Beta-binomial: the mean over all shares, each as likely beforehand as any other, after what was answered and
+        missed. A product instead of two beta functions, which cancel for small counts.
+        """
+        chance = 1.0
+        for lost in range(questions):
+            chance *= (self.missed + 1 + lost) / (self.missed + self.answered + 2 + lost)
+        return chance
+
+    def tells_absent(self, questions: int) -> bool:
+        return self.chance_of_silence(questions) < CERTAIN
 
 
 @dataclass(slots=True)

@@ -14,17 +14,21 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as wire
 from pymavlink.dialects.v20.ardupilotmega import MAVLink_message
 
+from telemetry.simulation.simulator.autopilot.personality import Make
 from telemetry.simulation.simulator.autopilot.pilot import Text
 from telemetry.simulation.simulator.own_logs.keeping import OwnLogs
+from telemetry.simulation.simulator.protocol.ardupilot_dialect import ARDUPILOT
 from telemetry.simulation.simulator.protocol.command_protocol import RESULTS, read_order, whole
-from telemetry.simulation.simulator.protocol.dialects import DIALECTS
+from telemetry.simulation.simulator.protocol.dialect import Dialect
 from telemetry.simulation.simulator.protocol.file_protocol import FileProtocol
 from telemetry.simulation.simulator.protocol.item_protocol import Reply
 from telemetry.simulation.simulator.protocol.log_protocol import LogProtocol
-from telemetry.simulation.simulator.protocol.parameter_errors import parameter_error
+from telemetry.simulation.simulator.protocol.parameter_protocol import parameter_error
 from telemetry.simulation.simulator.protocol.passing_traffic import passing
+from telemetry.simulation.simulator.protocol.px4.px4_dialect import PX4
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 
+DIALECTS: dict[Make, Dialect] = {"ardupilot": ARDUPILOT, "px4": PX4}
 HEARTBEAT_S = 1.0
 TRAFFIC_S = 1.0
 NEWS_S = 0.15

@@ -22,6 +22,9 @@ UNNUMBERED = 65535
 LIST_EVERY_S, LIST_SHARE = 0.02, 40
 """The whole list comes at up to 2,000 values a second, as 1,349 in 0.7 s on the real ArduCopter."""
 
+HASH = "_HASH_CHECK"
+"""PX4 answers to it, although it is no parameter."""
+
 
 class ParameterProtocol:
     """Says nothing about parameters that it does not have."""
@@ -74,3 +77,27 @@ class ParameterProtocol:
         return wire.MAVLink_param_value_message(
             name.encode(), self._parameters[name], TYPES[SPECS[name].kind], len(self._names), index
         )
+
+
+def parameter_error(message: Any, parameters: Parameters) -> Any | None:
+    """PARAM_ERROR, as newer firmware of both makes says it to the station that reads or sets what cannot be.
+
+    None: nothing is wrong with it. Older firmware is silent.
+    """
+    kind = message.get_type()
+    if kind == "PARAM_REQUEST_READ":
+        has = message.param_index < len(parameters) if message.param_index >= 0 else _has(message.param_id, parameters)
+        return None if has else _unknown(message, message.param_index)
+    if kind == "PARAM_SET" and message.param_id not in parameters:
+        return _unknown(message, -1)
+    return None
+
+
+def _has(name: str, parameters: Parameters) -> bool:
+    return name in parameters or name == HASH
+
+
+def _unknown(message: Any, index: int) -> Any:
+    station = message.get_srcSystem(), message.get_srcComponent()
+    code = wire.MAV_PARAM_ERROR_DOES_NOT_EXIST
+    return wire.MAVLink_param_error_message(*station, message.param_id.encode(), index, code)
