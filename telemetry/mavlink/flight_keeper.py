@@ -85,7 +85,7 @@ class FlightKeeper:
         if in_mission:
             self._on_mission(state, onboard)
         elif self.status.phase in GOING_HOME_FROM and (state.mode in RETURN_MODES or state.mode in LAND_MODES):
-            self._go_home()
+            self._go_home(state, onboard)
         elif joining:
             self._phase("flying" if state.landed == "in_air" else "taking_off")
         elif self.status.phase in ("taking_off", "flying", "returning"):
@@ -100,9 +100,7 @@ class FlightKeeper:
         status = replace(self.status, target=target or self.status.target, targets=targets, broke_off_at=None)
         if status != self.status:
             self.status = status
-        # The last item's number alone may be left over from the flight before.
-        at_end = targets is not None and target == targets and state.mission_reached == state.mission_item
-        self._completed = command in GOING_HOME_COMMANDS or at_end
+        self._completed = command in GOING_HOME_COMMANDS or _is_at_end(state, targets)
         if self._completed:
             self._phase("returning")
         else:
@@ -110,9 +108,11 @@ class FlightKeeper:
             climbing = starting and (command == MavCmd.NAV_TAKEOFF or not target or state.landed == "on_ground")
             self._phase("taking_off" if climbing else "flying")
 
-    def _go_home(self) -> None:
+    def _go_home(self, state: VehicleState, onboard: OnboardMission | None) -> None:
         if self.status.phase == "returning":
             return
+        # PX4 may tell of its mission's end and of its way home in one breath.
+        self._completed |= self.status.way == "auto" and _is_at_end(state, _count(state, onboard))
         broke_off_at = None if self._completed else self.status.broke_off_at or self.status.target
         self.status = replace(self.status, phase="returning", broke_off_at=broke_off_at)
 
@@ -129,6 +129,11 @@ class FlightKeeper:
     def _phase(self, phase: FlightPhase) -> None:
         if self.status.phase != phase:
             self.status = replace(self.status, phase=phase)
+
+
+def _is_at_end(state: VehicleState, targets: int | None) -> bool:
+    """The last item's number alone may be left over from the flight before."""
+    return bool(targets) and item_of(state) == targets and state.mission_reached == state.mission_item
 
 
 def item_of(state: VehicleState) -> int | None:

@@ -108,6 +108,16 @@ def test_a_mission_that_the_remote_control_started_is_followed_too() -> None:
     assert (keeper.status.way, keeper.status.target) == ("auto", 2)
 
 
+@pytest.mark.parametrize(("reached", "ends"), [(4, None), (3, 4)])
+def test_a_px4_that_reaches_the_end_and_turns_home_in_one_breath_has_flown_it(reached: int, ends: int | None) -> None:
+    keeper, px4 = started(), replace(FLYING, autopilot="px4", mode="MISSION")
+    home = replace(px4, mode="RTL", mission_item=reached, mission_reached=reached)
+    on_ground = replace(LANDED, autopilot="px4")
+    phases = follow(keeper, replace(px4, mission_item=3, mission_reached=2), home, on_ground)
+    assert phases == ["flying", "returning", "interrupted" if ends else "landed"]
+    assert keeper.status.broke_off_at == ends
+
+
 def test_px4_counts_from_zero() -> None:
     state = replace(at(1), autopilot="px4", mode="MISSION")
     assert (item_of(state), sequence_of(2, "px4")) == (2, 1)
