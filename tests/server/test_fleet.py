@@ -167,6 +167,9 @@ def test_a_command_goes_to_the_vehicle_that_it_names_and_to_no_other(pair: Stati
     ok(pair.http.post("/api/lease/release", headers=WASP))
     assert pair.http.post("/api/flight/disarm", headers=WASP).json()["code"] == "not_in_charge"
     assert pair.until(lambda m: m.type == "fleet" and m.vehicles[1].holder is None).vehicles[0].holder is not None
+    # Armed is recorded; the tests after this one begin without it.
+    (kept,) = pair.until(lambda m: m.type == "recordings" and len(m.recordings) == 1, LONG_S).recordings
+    ok(pair.http.delete(f"/api/recordings/{kept.id}"))
 
 
 @pytest.mark.xdist_group("real-time")
