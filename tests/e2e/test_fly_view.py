@@ -143,14 +143,15 @@ def _review_what_was_flown(page: Page) -> None:
     expect(page.get_by_test_id("cross-track-p95")).to_contain_text(re.compile(r"\d\.\d\d"))
     expect(page.locator(".time-pane .u-over")).to_be_visible()
 
-    page.get_by_test_id("speed").select_option("5")
+    page.get_by_test_id("review-part-instruments").click()
+    page.get_by_test_id("speed").select_option("2")
     play(page)
     before = page.get_by_test_id("replay-time").inner_text()
     expect(page.get_by_test_id("replay-time")).not_to_have_text(before, use_inner_text=True)
+    # While it plays: it begins with what was recorded before the vehicle was first heard.
+    expect(page.get_by_test_id("instruments-replay").get_by_test_id("ground-speed")).to_contain_text("m/s")
     page.get_by_test_id("play").click()
     expect(page.get_by_test_id("play")).to_have_text("Play")
-    page.get_by_test_id("review-part-instruments").click()
-    expect(page.get_by_test_id("instruments-replay").get_by_test_id("ground-speed")).to_contain_text("m/s")
     # A recording is only looked at: what commands the live vehicle is marked, and there is nothing else.
     expect(page.get_by_text("LIVE", exact=True)).to_be_visible()
     expect(page.get_by_test_id("next-action")).to_have_count(0)
