@@ -2,6 +2,7 @@ import { signal } from "@preact/signals";
 import { count, latLon, metres } from "../format";
 import { Segmented } from "../ui/Button";
 import { throttled } from "../ui/throttle";
+import { fly } from "../store/flying";
 import { chartHeight_px } from "../store/prefs";
 import { computation, cursor, isFresh, result } from "../store/state";
 import { send } from "../store/stream";
@@ -82,7 +83,8 @@ function CursorValues({ result, cursor }: { result: ResultDoc; cursor: CursorMes
 export function ProfilePane() {
   const shown = result.value;
   const place = cursor.value?.s_m == null ? null : cursor.value;
-  const flown = viewId.value === "fly";
+  // What was taken up in flight begins elsewhere: its distances are not those of the open plan.
+  const flown = viewId.value === "fly" && !fly.value?.taken_up;
   return (
     <section
       class="profile-pane"

@@ -5,28 +5,33 @@ import { whyUnheard } from "../store/reach";
 import { Icon } from "../ui/Icon";
 import { ageWord, lossWord, roundTripWord, signalTitle, signalWord } from "../vehicle/way_words";
 
-function Row({ way, told_s }: { way: WayStatus; told_s: number }) {
+/** Its address has a line to itself: it is longer than all its figures together. */
+function Way({ way, told_s }: { way: WayStatus; told_s: number }) {
   return (
-    <tr data-testid="way-row" data-in-use={way.in_use}>
-      <th scope="row">
-        <span class={way.in_use ? "way-mark" : "way-mark hidden"} title="In use: orders go over it">
-          <Icon name="check" />
-        </span>
-        {way.address}
-      </th>
+    <tbody data-testid="way-row" data-in-use={way.in_use}>
+      <tr>
+        <th scope="rowgroup" colSpan={4}>
+          <span class={way.in_use ? "way-mark" : "way-mark hidden"} title="In use: orders go over it">
+            <Icon name="check" size={14} />
+          </span>
+          {way.address}
+        </th>
+      </tr>
       {way.identity === "asked" ? (
-        <td colSpan={4} class="muted">
-          Checking whether it is the same vehicle…
-        </td>
+        <tr>
+          <td colSpan={4} class="muted">
+            Checking whether it is the same vehicle…
+          </td>
+        </tr>
       ) : (
-        <>
+        <tr>
           <td>{lossWord(way)}</td>
           <td>{roundTripWord(way)}</td>
           <td>{ageWord(way, told_s)}</td>
           <td title={signalTitle(way)}>{signalWord(way)}</td>
-        </>
+        </tr>
       )}
-    </tr>
+    </tbody>
   );
 }
 
@@ -39,18 +44,15 @@ export function WayTable({ ways }: { ways: readonly WayStatus[] }) {
       <table aria-label="Ways to the vehicle" data-testid="ways">
         <thead>
           <tr>
-            <th scope="col">Way</th>
             <th scope="col">Lost</th>
-            <th scope="col">There and back</th>
+            <th scope="col">Round trip</th>
             <th scope="col">Age</th>
             <th scope="col">Signal</th>
           </tr>
         </thead>
-        <tbody>
-          {ways.map((way) => (
-            <Row key={way.address} way={way} told_s={told_s} />
-          ))}
-        </tbody>
+        {ways.map((way) => (
+          <Way key={way.address} way={way} told_s={told_s} />
+        ))}
       </table>
     </div>
   );
