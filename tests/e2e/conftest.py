@@ -180,7 +180,10 @@ def _said(message: ConsoleMessage) -> str:
 @contextmanager
 def _watched(browser: Browser) -> Iterator[BrowserContext]:
     """Fails the test when one of its pages asks any other origin, or when its console logs an error."""
-    context = browser.new_context(viewport={"width": 1366, "height": 768}, accept_downloads=True)
+    # What slides in is where it stays: a place that a test reads or presses does not move on.
+    context = browser.new_context(
+        viewport={"width": 1366, "height": 768}, accept_downloads=True, reduced_motion="reduce"
+    )
     asked: set[str] = set()
     errors: list[str] = []
     context.on("request", lambda request: asked.add("/".join(request.url.split("/")[:3])))

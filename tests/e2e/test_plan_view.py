@@ -91,7 +91,8 @@ def _click_points(page: Page, shares: list[tuple[float, float]]) -> None:
 
 
 def _distance_m(page: Page) -> float:
-    """The smallest distance on the certificate of the finished computation; -1 until there is one."""
+    """The smallest distance on the certificate of the plan as it stands, once it is computed."""
+    expect(page.get_by_test_id("verdict")).not_to_have_attribute("data-verdict", "computing")
     text = page.get_by_test_id("min-distance").inner_text() if page.get_by_test_id("min-distance").count() else ""
     found = re.search(r"-?\d+\.\d+", text)
     return float(found.group(0)) if found else -1.0

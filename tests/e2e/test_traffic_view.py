@@ -76,6 +76,13 @@ def test_the_demos_aircraft_is_listed_and_what_is_warned_of_is_set(overflown: St
     expect(page.get_by_test_id("traffic-warn_distance_m")).to_have_value("1500", timeout=LONG_MS)
 
 
+BOUNDS = """panel => [panel, ...panel.querySelectorAll("li span, li strong")].map(part => {
+    const box = part.getBoundingClientRect();
+    return [box.left, box.right];
+})"""
+"""Left and right, px, of the panel and of all that stands in its rows: at one moment, for a drawer slides in."""
+
+
 def fly_among(page: Page) -> None:
     """What the server says of traffic is what ``SKY`` holds."""
     sky = TrafficMessage(source="live", now_mono_s=100.0, settings=TrafficSettings(), status=status(*SKY, filtered=3))
@@ -119,10 +126,8 @@ def test_a_warning_and_its_aircraft_are_read_and_chosen(overflown: Station, page
     expect(note).to_contain_text("And 3 too far or high to show.")
     rows.nth(1).get_by_role("button").press("Enter")
     expect(note).to_contain_text("height unknown: counts as yours")
-    panel = page.get_by_test_id("traffic-live").bounding_box()
-    assert panel is not None
-    for part in page.get_by_test_id("traffic-live").locator("li span, li strong").all():
-        box = part.bounding_box()
-        assert box is not None
-        assert box["x"] >= panel["x"]
-        assert box["x"] + box["width"] <= panel["x"] + panel["width"] + 1
+    panel, *parts = page.get_by_test_id("traffic-live").evaluate(BOUNDS)
+    assert parts
+    for left, right in parts:
+        assert left >= panel[0]
+        assert right <= panel[1] + 1
