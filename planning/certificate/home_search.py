@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
-from mapping.geometry.arrays import F32, F64, I64
+from mapping.geometry.arrays import F32, F64, I64, Bools
 from planning.certificate.home_ground import HomeGround, free_step_m, gap_m, home_ground
 from planning.terrain.dsm import Dsm, SurfaceModel
 
@@ -91,11 +92,12 @@ def _search(
         return None, None
     places = _places(grid, search_m)
     rough = _rough(grid.high_m, grid.low_m, grid.cell_m, radius_m)
+    discs = _discs(grid, rough, centre_m, radius_m)
     drops_m = np.empty(len(places))
     after = 0
     for _ in range(_MOST_CHECKED):
         found = _first(
-            grid.high_m, grid.low_m, rough, grid.cell_m, places, after, centre_m, radius_m, most_drop_m, drops_m
+            grid.high_m, grid.low_m, rough, *discs, grid.cell_m, places, after, centre_m, radius_m, most_drop_m, drops_m
         )
         if found < 0:
             break
@@ -198,33 +200,94 @@ def _near_m(rows, cols, cell_m):
     return cell_m * math.hypot(max(0.0, abs(rows) - 0.5), max(0.0, abs(cols) - 0.5))
 
 
+def _discs(grid: _Grid, rough: Bools, centre_m: float, radius_m: float) -> tuple[F32, F32, I64, I64, I64]:
+    """Lowest blocks and rough ones in windows, and the half widths by row of three discs around a place: what is in
+    reach, where a rough block may block, and where it does in any case, for all that is beside it is in reach, too."""
+    lowest_m = np.where(np.isnan(grid.low_m), np.float32(-np.inf), grid.low_m)
+    reach, may_block, blocks = (
+        _half_widths(radius, grid.cell_m) for radius in (centre_m + radius_m, centre_m, centre_m - 1.5 * grid.cell_m)
+    )
+    widest = int(reach.max())
+    return _windows(lowest_m, widest), _windows(np.where(rough, 0.0, 1.0), widest), reach, may_block, blocks
+
+
+def _half_widths(radius_m: float, cell_m: float) -> I64:
+    """(R,) of a disc around a block's middle, from its own row on, in blocks."""
+    steps = np.arange(max(0, math.ceil(radius_m / cell_m + 0.5)) + 2)
+    near_m = cell_m * np.hypot(*(np.maximum(0.0, side - 0.5) for side in np.meshgrid(steps, steps)))
+    counts = (near_m <= radius_m).sum(axis=1)
+    return counts[counts > 0].astype(np.int64) - 1
+
+
+def _windows(value: NDArray[np.floating], half_width: int) -> F32:
+    """(L, H, W) the smallest of 1, 2, 4 ... blocks of a row from each one on, as far as it goes."""
+    levels = [np.ascontiguousarray(value, dtype=np.float32)]
+    while 2 ** len(levels) <= 2 * half_width + 1:
+        last, step = levels[-1], 2 ** (len(levels) - 1)
+        after = np.full_like(last, np.inf)
+        after[:, : max(0, last.shape[1] - step)] = last[:, step:]
+        levels.append(np.minimum(last, after))
+    return np.stack(levels)
+
+
 @njit(cache=True, nogil=True)
-def _drop_m(high_m, low_m, rough, cell_m, row, col, centre_m, radius_m):
+def _lowest_in(windows, row, col, half_widths):
+    """The smallest in a disc around a block."""
+    lowest = np.inf
+    for rows in range(half_widths.shape[0]):
+        wide = 2 * half_widths[rows] + 1
+        level = 0
+        while 2 << level <= wide:
+            level += 1
+        first = col - half_widths[rows]
+        last = first + wide - (1 << level)
+        for r in (row - rows, row + rows):
+            lowest = min(lowest, windows[level, r, first], windows[level, r, last])
+    return lowest
+
+
+@njit(cache=True, nogil=True)
+def _is_blocked(high_m, low_m, rough, cell_m, row, col, may_block, blocks, reach_m, radius_m):
+    """Whether a rough block between both discs is too steep beside one in reach."""
+    for rows in range(may_block.shape[0]):
+        inner = blocks[rows] if rows < blocks.shape[0] else -1
+        for cols in range(inner + 1, may_block[rows] + 1):
+            for r in (row - rows, row + rows):
+                for c in (col - cols, col + cols):
+                    if rough[r, c] and _is_blocked_by(high_m, low_m, r, c, cell_m, row, col, reach_m, radius_m):
+                        return True
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _drop_m(high_m, low_m, rough, lowest, roughest, reach, may_block, blocks, cell_m, row, col, centre_m, radius_m):
     """By how much a vehicle at a block's middle may stand lower; infinite where it cannot start."""
-    reach_m = centre_m + radius_m
-    around = math.ceil(reach_m / cell_m + 0.5)
+    around = math.ceil((centre_m + radius_m) / cell_m + 0.5)
     if row < around or col < around or row + around >= high_m.shape[0] or col + around >= high_m.shape[1]:
         return np.inf
-    lowest = np.inf
-    for r in range(row - around, row + around + 1):
-        for c in range(col - around, col + around + 1):
-            near_m = _near_m(r - row, c - col, cell_m)
-            if near_m > reach_m:
-                continue
-            if np.isnan(low_m[r, c]):
-                return np.inf
-            may_block = near_m <= centre_m and rough[r, c]
-            if may_block and _is_blocked_by(high_m, low_m, r, c, cell_m, row, col, reach_m, radius_m):
-                return np.inf
-            lowest = min(lowest, low_m[r, c])
-    return high_m[row, col] - lowest
+    if _lowest_in(roughest, row, col, blocks) == 0.0:
+        return np.inf
+    low = _lowest_in(lowest, row, col, reach)
+    if low == -np.inf:
+        return np.inf
+    if _lowest_in(roughest, row, col, may_block) == 0.0 and _is_blocked(
+        high_m, low_m, rough, cell_m, row, col, may_block, blocks, centre_m + radius_m, radius_m
+    ):
+        return np.inf
+    return high_m[row, col] - low
 
 
 @njit(cache=True, nogil=True)
-def _first(high_m, low_m, rough, cell_m, places, after, centre_m, radius_m, most_drop_m, drops_m):
+def _first(
+    high_m, low_m, rough, lowest, roughest, reach, may_block, blocks, cell_m, places, after, centre_m, radius_m,
+    most_drop_m, drops_m,
+):  # fmt: skip
     """The first place from ``after`` on that drops by no more than asked for, -1 without one; fills ``drops_m``."""
     for k in range(after, places.shape[0]):
-        drops_m[k] = _drop_m(high_m, low_m, rough, cell_m, places[k, 0], places[k, 1], centre_m, radius_m)
+        row, col = places[k, 0], places[k, 1]
+        drops_m[k] = _drop_m(
+            high_m, low_m, rough, lowest, roughest, reach, may_block, blocks, cell_m, row, col, centre_m, radius_m
+        )
         if drops_m[k] <= most_drop_m:
             return k
     return -1

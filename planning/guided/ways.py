@@ -147,6 +147,8 @@ def _lowest(asked: _Asked, shape: _Shape) -> GuidedWay:
         if way.problem is None:
             return way
         hopeless = not codes <= MENDED_BY_HEIGHT | OWN_RETURNS | LANDINGS
+        # Where only the vehicle's own return is left, and height mends not all of it, higher is no better.
+        hopeless = hopeless or (way.problem == "return" and not codes <= MENDED_BY_HEIGHT | {"rally"})
         if best is None or (best.problem == "way" and (hopeless or way.problem == "return")):
             best = way
         if hopeless:

@@ -11,11 +11,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mapping.geometry.arrays import I64, Bools
 from planning.basics.plan_model import FlownLine, Poi, VehicleProfile
 from planning.certificate.certificate_model import ClearanceParams
 from planning.certificate.clearance import certify
-from planning.certificate.home_ground import home_ground
-from planning.certificate.home_search import SPARE_M, nearest_standing
+from planning.certificate.home_ground import FREE_SLOPE, FREE_STEP_M, home_ground
+from planning.certificate.home_search import SPARE_M, _discs, _first, _Grid, _rough, nearest_standing
 from planning.planner.plan import plan_mission
 from planning.planner.request import PlanRequest
 from planning.terrain.dsm import Dsm
@@ -246,6 +247,52 @@ def test_the_search_finds_the_nearest_by_brute_force() -> None:
             break
     assert near.away_m == pytest.approx(away_m)
     assert 1.0 < near.away_m < 10.0
+
+
+def slow_drop_m(grid: _Grid, rough: Bools, place: I64, centre_m: float, radius_m: float) -> float:
+    """The rule of the search, block by block."""
+    height, width = grid.high_m.shape
+    (row, col), reach_m = place, centre_m + radius_m
+    r, c = np.mgrid[:height, :width]
+    near_m = grid.cell_m * np.hypot(np.maximum(0, np.abs(r - row) - 0.5), np.maximum(0, np.abs(c - col) - 0.5))
+    reached = near_m <= reach_m
+    around = math.ceil(reach_m / grid.cell_m + 0.5)
+    if min(row, col) < around or row + around >= height or col + around >= width or np.isnan(grid.low_m[reached]).any():
+        return math.inf
+    for a, b in np.argwhere((near_m <= centre_m) & rough):
+        gap_m = grid.cell_m * np.hypot(np.maximum(0, np.abs(r - a) - 1), np.maximum(0, np.abs(c - b) - 1))
+        far_m = grid.cell_m * np.hypot(r - a, c - b)
+        differ_m = np.maximum(grid.high_m - grid.low_m[a, b], grid.high_m[a, b] - grid.low_m)
+        steep = differ_m > np.maximum(FREE_STEP_M, FREE_SLOPE * far_m) + 1e-4
+        if (steep & reached & (gap_m <= radius_m)).any():
+            return math.inf
+    return float(grid.high_m[row, col] - grid.low_m[reached].min())
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    centre_m=st.floats(0.0, 2.6),
+    radius_m=st.floats(0.2, 0.7),
+    cell_m=st.sampled_from([0.1, 0.25, 0.4]),
+)
+def test_discs_by_rows_find_what_the_rule_finds_block_by_block(
+    seed: int, centre_m: float, radius_m: float, cell_m: float
+) -> None:
+    random = np.random.default_rng(seed)
+    high_m = random.uniform(0.0, 0.4, (36, 36)).astype(np.float32)
+    for _ in range(int(random.integers(0, 6))):
+        row, col = random.integers(0, 36, 2)
+        high_m[row, col] = random.choice([3.0, -3.0, np.nan])
+    low_m = high_m - random.uniform(0.0, 0.1, high_m.shape).astype(np.float32)
+    grid = _Grid(high_m, low_m, cell_m, 0.0, 0.0, np.zeros(2))
+    places = np.argwhere(np.ones_like(high_m, dtype=bool)).astype(np.int64)[::5]
+    rough = _rough(high_m, low_m, cell_m, radius_m)
+    drops_m = np.empty(len(places))
+    discs = _discs(grid, rough, centre_m, radius_m)
+    assert _first(high_m, low_m, rough, *discs, cell_m, places, 0, centre_m, radius_m, -1.0, drops_m) == -1
+    slow_m = [slow_drop_m(grid, rough, place, centre_m, radius_m) for place in places]
+    np.testing.assert_allclose(drops_m, slow_m, atol=1e-6)
 
 
 def test_without_a_level_place_the_most_level_is_named() -> None:
