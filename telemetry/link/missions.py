@@ -52,6 +52,10 @@ FOREIGN_MISSION = (
     "The mission on board is not the one that was started any more: another ground station has written to it."
     " The vehicle holds. Return home or land."
 )
+NOT_TAKEN_UP = (
+    "The vehicle began to fly what was sent to it from here in this flight and was not taken up: somebody else"
+    " changed its mode. The vehicle holds. Take the plan up again, return home or land."
+)
 
 
 async def start_mission(vehicle: AdoptedVehicle, digest: str, read_mission: ReadMission) -> None:
@@ -191,15 +195,15 @@ class UnderWay:
     def replaces(self) -> None:
         """What is on board is replaced: it is not flown before it is taken up."""
         digest = self.started.digest or self._onboard.digest or UNKNOWN_MISSION
-        self.started = Started(digest, self.started.begins)
+        self.started = Started(digest, self.started.begins, replaced_here=True)
 
     def replaces_places(self) -> None:
         """Fence or rally points are: the mission on board was not certified with those that come."""
-        self.begin(OTHER_PLACES)
+        self.started, self._is_inherited = Started(OTHER_PLACES, replaced_here=True), False
 
     def on_state(self, state: VehicleState) -> None:
         if _flies_mission(state) and self.started.begins is not None:
-            self.started = Started(self.started.digest)
+            self.started = replace(self.started, begins=None)
         if self._onboard.mission is not None:
             self._is_inherited = False
 
@@ -217,6 +221,12 @@ class UnderWay:
             check_same_mission(self._onboard, self.started.digest)
         if self.started.begins is not None:
             check_begins(self.started.begins, state)
+
+    @property
+    def why_foreign(self) -> str:
+        """Whose the mission is that is not the one that was started."""
+        is_ours = self.started.replaced_here and not self._onboard.is_written_by_others
+        return NOT_TAKEN_UP if is_ours else FOREIGN_MISSION
 
     def turns_foreign(self, state: VehicleState) -> bool:
         """The vehicle flies by another mission than the one that was started: true once."""

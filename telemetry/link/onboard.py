@@ -27,6 +27,8 @@ class Started:
     """Of the mission that was started from here."""
     begins: TakeUp | None = None
     """Where a mission that was taken up in flight begins, until it is flown."""
+    replaced_here: bool = False
+    """Since then lists were sent from here in flight, and were not taken up."""
 
 
 class OnBoard:
@@ -35,6 +37,8 @@ class OnBoard:
     def __init__(self) -> None:
         self.mission: OnboardMission | None = None
         self.fence = FenceAboard()
+        self.is_written_by_others = False
+        """Somebody else was seen to replace it since it was last sent from here."""
         self._transferring = False
         self._settled_s = self._counted_s = 0.0
         self._seen: tuple[int | None, int | None] | None = None
@@ -52,7 +56,7 @@ class OnBoard:
     def transfer_begins(self, *, replaces: bool) -> None:
         self._transferring = True
         if replaces:
-            self.mission = None
+            self.mission, self.is_written_by_others = None, False
 
     def transfer_ends(self, mission: OnboardMission | None, now_s: float) -> None:
         """``mission`` None: it failed."""
@@ -97,6 +101,6 @@ class OnBoard:
         return state.mission_items in (None, len(self.mission.items))
 
     def _lose(self) -> bool:
-        was_known = self.mission is not None
+        was_known, self.is_written_by_others = self.mission is not None, True
         self.mission = None
         return was_known

@@ -14,7 +14,6 @@ from telemetry.flight.guided.remaining_mission import RemainingMission, remainin
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.avoidance import Avoidance, remaining_after
 from telemetry.link.missions import (
-    FOREIGN_MISSION,
     JoinMission,
     ReadMission,
     UnderWay,
@@ -138,15 +137,16 @@ class Pilot:
     def _watch_mission(self, state: VehicleState) -> None:
         """A vehicle that flies by another mission than the one that was checked is stopped, once."""
         if self._under_way.turns_foreign(state):
-            self._alarm(FOREIGN_MISSION)
-            self._spawn(self._stop_foreign_mission())
+            why = self._under_way.why_foreign
+            self._alarm(why)
+            self._spawn(self._stop_foreign_mission(why))
 
-    async def _stop_foreign_mission(self) -> None:
+    async def _stop_foreign_mission(self, why: str) -> None:
         try:
             await self.pause()
         except TelemetryError as error:
             self._alarm(f"The vehicle does not hold: {error}")
-        self.flight.say(FOREIGN_MISSION)
+        self.flight.say(why)
 
     def _follow_avoidance(self) -> None:
         before = self.flight.status

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import MissionUnknownError, NotAllowedError
-from telemetry.link.missions import UnderWay
+from telemetry.link.missions import FOREIGN_MISSION, NOT_TAKEN_UP, UnderWay
 from telemetry.link.onboard import OnBoard, Started
 from telemetry.nodes.link import Memory, read_memory, write_memory
 from telemetry.topics.messages import FlightStatus
@@ -89,7 +90,38 @@ def test_what_the_node_before_knew_is_held_against_what_is_read_and_stops_nobody
     assert not flight.turns_foreign(holding(mode="AUTO")), "said once"
 
 
-@pytest.mark.parametrize("started", [Started(), Started("old"), Started("new", TAKEN_UP)])
+@pytest.mark.parametrize("places", [False, True])
+def test_who_flies_our_own_lists_that_were_not_taken_up_is_not_told_of_another_station(*, places: bool) -> None:
+    onboard = on_board("old")
+    flight = UnderWay(onboard)
+    flight.begin("old")
+    if places:
+        flight.replaces_places()
+    else:
+        flight.replaces()
+        onboard.transfer_begins(replaces=True)
+        onboard.transfer_ends(OnboardMission(MISSION, None, None, None, "new"), 0.0)
+    assert flight.turns_foreign(holding(mode="AUTO"))
+    assert flight.why_foreign == NOT_TAKEN_UP
+    onboard.on_foreign(mavlink.MAVLink_mission_clear_all_message(1, 1), 1)
+    assert flight.why_foreign == FOREIGN_MISSION, "somebody else wrote after us"
+    flight.begin("new", TAKEN_UP)
+    assert flight.why_foreign == FOREIGN_MISSION
+
+
+def test_a_node_that_is_started_anew_still_knows_that_it_was_us() -> None:
+    onboard = on_board(None)
+    flight = UnderWay(onboard)
+    flight.inherit(Started("old", replaced_here=True))
+    onboard.transfer_ends(OnboardMission(MISSION, None, None, None, "mixed"), 0.0)
+    flight.on_state(holding())
+    assert flight.turns_foreign(holding(mode="AUTO"))
+    assert flight.why_foreign == NOT_TAKEN_UP
+
+
+@pytest.mark.parametrize(
+    "started", [Started(), Started("old"), Started("new", TAKEN_UP), Started("old", replaced_here=True)]
+)
 def test_it_is_written_down_for_the_next_node(tmp_path: Path, started: Started) -> None:
     memory = Memory(flight=FLYING, started=started)
     write_memory(tmp_path / "link.json", memory)
