@@ -302,7 +302,8 @@ class Flying:
         """As vehicles that wait for their start are held against it."""
         status = self.connections.status
         is_verified = status is not None and status.mission_state == "verified" and self._aboard.record is not None
-        return known(self.name, self.live, is_verified=is_verified)
+        is_verified = is_verified and self._followed.is_settled
+        return known(self.name, self.live, is_verified=is_verified, waits_in_air=self.desk.waits_in_air)
 
     # Pages and who is in charge
 

@@ -8,8 +8,18 @@ from fastapi import APIRouter
 from fastapi.responses import Response
 
 from server.api.access import DONE, ERROR_RESPONSES, Fly, InCharge, answer
-from server.schemas import FlyState, FlyWayBody, GuidedState, StartFlight, TakeUpPlan, UploadPlan, WayBody, WaySpeedBody
-from telemetry.topics.requests import Arm, Disarm, Land, LinkRequest, Operator, Pause, Resume, ReturnHome, StopMotors
+from server.schemas import (
+    FlyState,
+    FlyWayBody,
+    GuidedState,
+    ResumeFlight,
+    StartFlight,
+    TakeUpPlan,
+    UploadPlan,
+    WayBody,
+    WaySpeedBody,
+)
+from telemetry.topics.requests import Arm, Disarm, Land, LinkRequest, Operator, Pause, ReturnHome, StopMotors
 
 router = APIRouter(prefix="/api/flight", tags=["flight"], responses=ERROR_RESPONSES)
 
@@ -37,6 +47,12 @@ async def take_up(body: TakeUpPlan, operator: InCharge, flying: Fly) -> Response
 async def start(body: StartFlight, operator: InCharge, flying: Fly) -> None:
     """Flies the mission that was checked; 409 when the check is missing, old, or did not go well."""
     await flying.desk.start(operator, body)
+
+
+@router.post("/resume", **DONE)
+async def resume(operator: InCharge, flying: Fly, body: ResumeFlight | None = None) -> None:
+    """Goes on with what was paused; 409 where a plan that was taken up would meet another of the station's vehicles."""
+    await flying.desk.resume(operator, [] if body is None else body.accept)
 
 
 @router.put("/way", response_model=GuidedState)
@@ -75,7 +91,6 @@ def _add_command(name: str, command: Callable[[Operator], LinkRequest], descript
 _add_command("arm", Arm)
 _add_command("disarm", Disarm, "Only on the ground.")
 _add_command("pause", Pause, "The vehicle holds its position.")
-_add_command("resume", Resume, "Goes on with what was paused.")
 _add_command("return_home", ReturnHome)
 _add_command("land", Land, "Here and now.")
 _add_command("emergency_stop", StopMotors, "The motors stop at once, also in the air: the vehicle falls.")

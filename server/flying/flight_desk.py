@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Collection
 from dataclasses import replace
 
 from planning.errors import DescribedError
@@ -18,7 +18,7 @@ from server.flying.check_task import Checked
 from server.flying.checklist_desk import ChecklistDesk
 from server.flying.in_flight.take_up_desk import FIRMWARES, TakingUp, with_words
 from server.flying.in_flight.take_up_task import AskedTakeUp, MadeTakeUp
-from server.flying.starting import Ready, check_start, preflight_now
+from server.flying.starting import Ready, check_goes_on, check_start, preflight_now
 from server.flying.upload_task import MadeUpload
 from server.flying.work import FlightWork
 from server.heard.channel import Channel
@@ -39,6 +39,7 @@ from server.workspace import Workspace
 from telemetry.bus.bus import Bus
 from telemetry.bus.link_client import LinkClient
 from telemetry.errors import NotAllowedError, NoVehicleError, TransferError
+from telemetry.mavlink.flight_keeper import item_of
 from telemetry.topics.messages import FlightStatus, LinkStatus, PlanRecord, Topic
 from telemetry.topics.onboard_lists import Item, OnboardMission, PlaceList, UploadReport
 from telemetry.topics.requests import (
@@ -46,6 +47,7 @@ from telemetry.topics.requests import (
     DownloadPlaces,
     LinkRequest,
     Operator,
+    Resume,
     StartAuto,
     StartGuided,
     Upload,
@@ -92,7 +94,7 @@ class FlightDesk:
             checklist=self._checklist.doc,
             resume_from_item=self._flight.broke_off_at,
             at_fence=self._at_fence,
-            taken_up=self._taken_up,
+            taken_up=None if self._taken_up is None else self._taken_up.model_copy(update={"others": self._others}),
             busy=self._busy,
         )
 
@@ -164,6 +166,7 @@ class FlightDesk:
         holding: ``resume`` flies that. Raises what is in the way, and says where that leaves the vehicle."""
         async with self._doing("Holding the vehicle"):
             self._ready = self._taken_up = None
+            self._others = None if self._others is None else PENDING
             taking = self._taking_up
             taking.check_flies()
             taking.begin_try()
@@ -219,6 +222,19 @@ class FlightDesk:
         finally:
             self.refresh()
         return self.state
+
+    @property
+    def waits_in_air(self) -> bool:
+        """With a plan that was taken up, of which nothing is flown yet."""
+        record, state = self._aboard.record, self._live.state
+        is_new = record is not None and record.taken_up and self._flight.phase == "paused"
+        return is_new and state is not None and (item_of(state) or 1) == 1
+
+    async def resume(self, operator: Operator, accept: Collection[str]) -> None:
+        """Raises CheckNeededError where a plan that was taken up would meet another vehicle now."""
+        if self._taken_up is not None or self.waits_in_air:
+            check_goes_on(self._others, accept)
+        await self._link.call(Resume(operator))
 
     async def command(self, request: LinkRequest) -> None:
         """At any time: whatever else is being done, the vehicle can be told to hold, return or land."""

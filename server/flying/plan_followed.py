@@ -26,6 +26,11 @@ class PlanFollowed:
         self._wake = asyncio.Event()
         self._made: tuple[str, Dsm | None] | None = None
 
+    @property
+    def is_settled(self) -> bool:
+        """What is followed is what is on board now."""
+        return _same(self._key(self._aboard.record), self._made)
+
     def look(self) -> None:
         if not _same(self._key(self._aboard.record), self._made):
             self._wake.set()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from mapping.geometry.frames import apart_m
@@ -67,6 +68,14 @@ def check_start(
         if row.state == "accept" and row.code not in body.accept:
             raise CheckNeededError(row.text, advice="Accept it, or mend it and check again.")
     return ready
+
+
+def check_goes_on(others: CheckRow | None, accept: Collection[str]) -> None:
+    """Raises CheckNeededError where a plan that was taken up in flight meets another vehicle, and nobody accepts it."""
+    if others is None or others.state == "good" or (others.state == "accept" and others.code in accept):
+        return
+    advice = "Accept it under On board, or wait." if others.state == "accept" else others.mend
+    raise CheckNeededError(others.text, advice=advice)
 
 
 def _has_moved(then: VehicleState, now: VehicleState) -> bool:

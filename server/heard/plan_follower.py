@@ -44,6 +44,8 @@ class Followed:
     demanded: Demanded | None = None
     """What the plan requires of the flight; None where nothing tells it."""
     profile: VehicleProfile | None = None
+    begins_in_air: bool = False
+    """It was taken up in flight: its way begins where the vehicle hovers, not at home."""
 
     @staticmethod
     def of(record: PlanRecord, dsm: Dsm) -> Followed:
@@ -51,7 +53,7 @@ class Followed:
         mission = read_wpl(record.mission_wpl)
         profile = parse_profile(record.profile_toml.encode(), where="the plan's profile")
         over = Followed.over(reference_line(mission, dsm, profile, begins_in_air=record.taken_up), dsm)
-        return replace(over, demanded=_demanded(record), profile=profile)
+        return replace(over, demanded=_demanded(record), profile=profile, begins_in_air=record.taken_up)
 
     @staticmethod
     def over(reference: Reference, dsm: Dsm) -> Followed:
@@ -79,7 +81,10 @@ class Ahead:
 
 @dataclass(frozen=True, slots=True)
 class Whole:
-    """All of a plan's way: up from home, along the line, and straight home at the return height."""
+    """All of a plan's way: up from home, along the line, and straight home at the return height.
+
+    One that was taken up in flight has no way up, and its times count from where it begins.
+    """
 
     lat_lon_deg: F64
     """(N, 2)"""
@@ -163,13 +168,16 @@ class Follower:
         line_m = np.repeat(reference.points_m, 2, axis=0)
         back_m = max(home_m + followed.profile.rtl_height_m, float(line_m[-1, 2]))
         home = np.array([[*line_m[-1, :2], back_m], [x, y, back_m], [x, y, home_m]])
-        points_m = np.vstack([[x, y, home_m], line_m, home])
-        t_s = np.concatenate([[0.0], np.column_stack([reference.arrive_s, reference.leave_s]).ravel()])
+        t_s, takeoff_s = np.column_stack([reference.arrive_s, reference.leave_s]).ravel(), reference.takeoff_s
+        if followed.begins_in_air:
+            points_m, t_s, takeoff_s = np.vstack([line_m, home]), t_s - t_s[0], 0.0
+        else:
+            points_m, t_s = np.vstack([[x, y, home_m], line_m, home]), np.concatenate([[0.0], t_s])
         return Whole(
             followed.placer.dsm.lat_lon_from_xy(points_m[:, :2]),
             points_m[:, 2] - home_m,
             np.maximum.accumulate(t_s) if np.isfinite(t_s).all() else None,
-            reference.takeoff_s,
+            takeoff_s,
         )
 
     def _keep_least(self, flight: FlightStatus, near: dict[str, float | None]) -> None:

@@ -29,6 +29,7 @@ from server.schemas.flight_docs import (
     PlayReview,
     PreflightDoc,
     RecordingDoc,
+    ResumeFlight,
     SetVehicleSigning,
     Source,
     StartFlight,

@@ -125,6 +125,8 @@ class TakenUpDoc(Strict):
     required_m: float
     notes: list[str]
     battery: CheckRow
+    others: CheckRow | None = None
+    """Whether it meets another vehicle if it is resumed now; null where the station has no other."""
 
 
 class FlyState(Strict):
@@ -235,6 +237,12 @@ class StartFlight(Strict):
     digest: str
     accept: list[Literal["gnss", "battery", "rtl_height", "avoidance", "fence", "others"]] = Field(default_factory=list)
     from_item: Annotated[int, Field(ge=1)] = 1
+
+
+class ResumeFlight(Strict):
+    """``accept``: what is said of the station's other vehicles, where a plan was taken up in flight."""
+
+    accept: list[Literal["others"]] = Field(default_factory=list)
 
 
 class OpenReview(Strict):

@@ -107,6 +107,41 @@ def test_the_way_home_counts_at_any_time_after_the_line() -> None:
     assert told(standing(mine), flying(theirs, 60.0)).state in ("accept", "bad")
 
 
+def taken_up(plan: Whole, gone_s: float) -> Other:
+    """It holds where the plan would be after so long, and goes on from there."""
+    assert plan.t_s is not None
+    it = flying(plan, gone_s)
+    left = np.concatenate([plan.t_s > gone_s, [True] * 3])
+    begin_deg = [[it.flown.state.lat_deg or 0.0, it.flown.state.lon_deg or 0.0]]
+    up_m = (it.flown.state.alt_amsl_m or 0.0) - HOME_ALT_M
+    rest = Whole(
+        np.vstack([begin_deg, plan.lat_lon_deg[left]]),
+        np.concatenate([[up_m], plan.alt_rel_home_m[left]]),
+        np.concatenate([[0.0], plan.t_s[plan.t_s > gone_s] - gone_s]),
+        0.0,
+    )
+    return replace(it, flown=replace(it.flown, ahead=None), on_board=rest, waits_in_air=True)
+
+
+@pytest.mark.parametrize(
+    ("holds_s", "gone_s", "state"),
+    [
+        (10.0, 10.0, "bad"),  # both are 40 s from the crossing
+        (48.0, 10.0, "accept"),  # 2 s from it, long before the other one comes
+        (80.0, 10.0, "good"),  # past it: its own way home is higher
+    ],
+)
+def test_a_plan_that_was_taken_up_is_judged_from_where_it_holds_as_if_resumed_now(
+    holds_s: float, gone_s: float, state: State
+) -> None:
+    theirs = flying(replace(ACROSS, alt_rel_home_m=_home_at(ACROSS, 200.0)), gone_s)
+    row = told(taken_up(EAST, holds_s), theirs)
+    assert row.state == state, row.text
+    if state == "bad":
+        assert row.text.startswith("Resumed now, it may come within 0 m of Bee in ")
+        assert row.mend == "Resume later, or land Bee first."
+
+
 def test_where_the_vehicle_takes_off_it_is_from_the_start_until_it_leaves() -> None:
     """The other one passes over home, low, while this one climbs."""
     over_home = whole((-60, 0), (0, 5), (-60, 10), up_m=8.0)
@@ -161,6 +196,10 @@ def test_who_waits_is_told_each_second_and_a_failure_is_no_all_clear() -> None:
     others[2] = flying(ACROSS, 0.0)
     asyncio.run(watch.look())
     assert (rows[1][-1].state, len(rows[2])) == ("bad", 1)
+    # One that holds with a new plan waits as well.
+    others[2] = taken_up(ACROSS, 20.0)
+    asyncio.run(watch.look())
+    assert rows[2][-1].text.startswith("Wasp has a mission on board")
 
     del others[2]
 

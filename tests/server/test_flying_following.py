@@ -8,7 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from planning.basics.mav_cmd import MavCmd
 from planning.following.below import Demanded
 from planning.following.reference import reference_line
 from planning.missions.vehicle_profile import load_profile
@@ -100,6 +102,21 @@ def test_the_whole_way_leads_up_along_the_line_and_home_at_the_return_height() -
     assert whole.t_s[-1] == max(reference.leave_s)
     assert Follower(replace(followed, profile=None)).whole() is None
     assert Follower(over=PLAIN).whole() is None
+
+
+def test_one_that_was_taken_up_in_flight_begins_where_it_holds_and_now() -> None:
+    profile = load_profile("generic-quad")
+    items = tuple(item for item in FLOWN.items if item.command != MavCmd.NAV_TAKEOFF)
+    reference = reference_line(replace(FLOWN, items=items), PLAIN, profile, begins_in_air=True)
+    followed = replace(Followed.over(reference, PLAIN), profile=profile, begins_in_air=True)
+    whole = Follower(followed).whole()
+    assert whole is not None
+    assert whole.t_s is not None
+    count = len(reference.points_m)
+    assert (len(whole.t_s), len(whole.alt_rel_home_m), whole.takeoff_s) == (2 * count, 2 * count + 3, 0.0)
+    assert whole.alt_rel_home_m[0] == reference.points_m[0, 2] - reference.home_alt_dsm_m
+    assert whole.t_s[0] == 0.0
+    assert whole.t_s[-1] == pytest.approx(reference.flight_s)
 
 
 _FIRST_POSITIONS = """

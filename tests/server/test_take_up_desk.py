@@ -15,13 +15,15 @@ import pytest
 
 from planning.fence.fence_model import Fence, circle
 from planning.formats.fence_items import fence_items
-from server.errors import NotCertifiedError, NotReadyError, StaleRevisionError
+from server.errors import CheckNeededError, NotCertifiedError, NotReadyError, StaleRevisionError
+from server.flying.apart.other_vehicles import PENDING
 from server.heard.onboard import onboard
-from server.schemas import TakeUpPlan
+from server.schemas import CheckRow, TakeUpPlan
 from server.work.jobs import Lane
 from telemetry.errors import NotAllowedError, SilentError, TransferError
 from telemetry.mavlink.items import wire_items
-from telemetry.topics.requests import Pause, TakeUp
+from telemetry.topics.messages import FlightStatus
+from telemetry.topics.requests import Pause, Resume, TakeUp
 from telemetry.topics.vehicle import VehicleState
 from tests.server.flying_desk_bench import ME, Bench, Made
 
@@ -103,6 +105,43 @@ def test_it_is_held_put_on_board_certified_and_taken_up(
         assert bench.aboard.record is not None
         assert bench.aboard.record.taken_up
         assert bench.aboard.record.certificate_json
+
+    runner.run(scenario())
+
+
+def test_beside_other_vehicles_it_is_resumed_as_a_start_would_be(
+    made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+) -> None:
+    def row(state: str) -> CheckRow:
+        return CheckRow.model_validate({"code": "others", "state": state, "text": f"Bee: {state}"})
+
+    async def scenario() -> None:
+        bench = await flown(made, tmp_path, lanes)
+        bench.desk.on_others(row("good"))  # of its start
+        state = await bench.desk.take_up(ME, TakeUpPlan(revision=3))
+        assert state.taken_up is not None
+        assert state.taken_up.others == PENDING
+        bench.desk.on_flight(FlightStatus(way="auto", phase="paused"))
+        bench.live.state = replace(bench.live.state, mission_item=1)
+        assert bench.desk.waits_in_air
+        for refused in (PENDING, row("bad"), row("unknown")):
+            bench.desk.on_others(refused)
+            with pytest.raises(CheckNeededError, match=refused.text):
+                await bench.desk.resume(ME, ["others"])
+        bench.desk.on_others(row("accept"))
+        assert bench.told[-1].taken_up is not None
+        assert bench.told[-1].taken_up.others == row("accept")
+        with pytest.raises(CheckNeededError, match="Bee: accept"):
+            await bench.desk.resume(ME, [])
+        assert Resume not in map(type, bench.vehicle.told)
+        await bench.desk.resume(ME, ["others"])
+        assert isinstance(bench.vehicle.told[-1], Resume)
+        bench.desk.on_flight(FlightStatus(way="auto", phase="flying"))
+        bench.desk.on_others(row("bad"))
+        assert not bench.desk.waits_in_air
+        bench.live.state = replace(bench.live.state, mission_item=4)
+        bench.desk.on_flight(FlightStatus(way="auto", phase="paused"))
+        await bench.desk.resume(ME, [])  # of a flight that goes on the alarm in the air tells
 
     runner.run(scenario())
 

@@ -1509,6 +1509,8 @@ export interface TakenUpDoc {
   required_m: number;
   notes: string[];
   battery: CheckRow;
+  /** Whether it meets another vehicle if it is resumed now; null where the station has no other. */
+  others: CheckRow | null;
 }
 
 /** What is on board, whether it may be flown, and what is being done about it. */
@@ -1610,6 +1612,11 @@ export interface StartFlight {
   digest: string;
   accept?: ("gnss" | "battery" | "rtl_height" | "avoidance" | "fence" | "others")[];
   from_item?: number;
+}
+
+/** ``accept``: what is said of the station's other vehicles, where a plan was taken up in flight. */
+export interface ResumeFlight {
+  accept?: "others"[];
 }
 
 export interface OpenReview {

@@ -79,6 +79,7 @@ describe("a checklist", () => {
       inAir: false,
       mine: true,
       accepted: new Set(),
+      othersAccepted: false,
       check_age_s: 0,
       obstacle: null,
     } as Facts;

@@ -1,7 +1,14 @@
 import { describe, expect, it } from "vitest";
 import { nextStep, wordsBeside, type Facts } from "../src/fly/next_step";
 import { uploadObstacle } from "../src/vehicle/orders";
-import type { CheckRow, FlightStatus, OnboardDoc, PreflightDoc, TransferStatus } from "../src/messages";
+import type {
+  CheckRow,
+  FlightStatus,
+  OnboardDoc,
+  PreflightDoc,
+  TakenUpDoc,
+  TransferStatus,
+} from "../src/messages";
 import { flyState, linkStatus, vehicleState } from "./flight_samples";
 
 const facts = (fields: Partial<Facts> = {}): Facts => ({
@@ -13,6 +20,7 @@ const facts = (fields: Partial<Facts> = {}): Facts => ({
   inAir: false,
   mine: true,
   accepted: new Set(),
+  othersAccepted: false,
   check_age_s: 0,
   obstacle: null,
   ...fields,
@@ -29,6 +37,30 @@ const row = (state: CheckRow["state"], code: CheckRow["code"] = "gnss"): CheckRo
 const checked = (...rows: CheckRow[]) =>
   flyState({ onboard: onboard(), preflight: { ok: true, rows } as PreflightDoc });
 const phase = (name: FlightStatus["phase"]) => ({ phase: name }) as FlightStatus;
+
+describe("a plan that was taken up beside other vehicles", () => {
+  const taken = (state: CheckRow["state"]) =>
+    facts({
+      flight: phase("paused"),
+      inAir: true,
+      fly: flyState({
+        taken_up: { others: { ...row(state, "others"), text: "It meets Bee." } } as TakenUpDoc,
+      }),
+    });
+
+  it("is resumed where it meets none, or what is said is accepted", () => {
+    expect(nextStep(taken("good"))).toEqual({ id: "resume" });
+    expect(nextStep({ ...taken("accept"), othersAccepted: true })).toEqual({ id: "resume" });
+    expect(nextStep(taken("accept"))).toMatchObject({ why: "Tick what you accept under On board first" });
+  });
+
+  it("waits, with the words, where it would meet one or nobody knows", () => {
+    for (const state of ["bad", "unknown"] as const) {
+      const step = nextStep({ ...taken(state), othersAccepted: true });
+      expect(step).toEqual({ id: "resume", why: "It meets Bee." });
+    }
+  });
+});
 
 describe("the next step", () => {
   it("without a vehicle is the simulator, what was heard, or waiting", () => {

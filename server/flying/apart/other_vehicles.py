@@ -1,7 +1,8 @@
 """A row of the check before the start, where a station has several vehicles: does this mission meet another one?
 
 What flies is judged by the predicted times at their worse end, as if the start were now. A mission that another vehicle
-only has on board is judged without times: nothing tells when it will be flown.
+only has on board is judged without times: nothing tells when it will be flown. A plan that was taken up in flight is
+judged alike, as if it were resumed now.
 """
 
 from __future__ import annotations
@@ -53,16 +54,21 @@ class Other:
     flies: bool
     on_board: Whole | None
     """Verified, and known here."""
+    waits_in_air: bool = False
+    """It holds, and what is on board was taken up and is not flown yet."""
 
 
-def known(name: str, channel: Channel, *, is_verified: bool) -> Other:
+def known(name: str, channel: Channel, *, is_verified: bool, waits_in_air: bool = False) -> Other:
     state, follower = channel.state, channel.follower
     flown = Flown(name, state or VehicleState(0, 0), follower.ahead(channel.flight))
-    return Other(flown, channel.in_air, follower.whole() if is_verified else None)
+    return Other(flown, channel.in_air, follower.whole() if is_verified else None, waits_in_air)
 
 
 class OtherVehicles:
-    """Tells each vehicle that waits for its start of the others, once a second. Belongs to the event loop."""
+    """Tells each vehicle that waits for its start, or in the air with a new plan, of the others, once a second.
+
+    Belongs to the event loop.
+    """
 
     def __init__(
         self,
@@ -93,7 +99,7 @@ class OtherVehicles:
     def _rows(self, seen: Mapping[int, Other]) -> dict[int, CheckRow]:
         now_s, rows = self._now_mono_s(), {}
         for number, mine in seen.items():
-            if not mine.flies:
+            if not mine.flies or mine.waits_in_air:
                 rows[number] = row_against(mine, [other for key, other in seen.items() if key != number], now_s)
         return rows
 
@@ -105,13 +111,14 @@ def row_against(mine: Other, others: Sequence[Other], now_s: float) -> CheckRow:
         return _ALONE
     if mine.on_board is None:
         return PENDING
-    found = [row for other in others if (row := _against(mine.flown.state, mine.on_board, other, now_s)) is not None]
+    found = [row for other in others if (row := _against(mine, mine.on_board, other, now_s)) is not None]
     return min(found, key=lambda row: ("bad", "accept").index(row.state), default=_CLEAR)
 
 
-def _against(state: VehicleState | None, mine: Whole, other: Other, now_s: float) -> CheckRow | None:
+def _against(who: Other, mine: Whole, other: Other, now_s: float) -> CheckRow | None:
     """None: it does not come near."""
-    name, theirs = other.flown.name, other.flown.state
+    name, theirs, state = other.flown.name, other.flown.state, who.flown.state
+    begun, begin = ("Resumed", "Resume") if who.waits_in_air else ("Started", "Start")
     origin_deg = float(mine.lat_lon_deg[0, 0]), float(mine.lat_lon_deg[0, 1])
     flat = _home_alt_m(state) is None or _home_alt_m(theirs) is None
     way_m = _way_m(mine, origin_deg, state, flat=flat)
@@ -136,10 +143,10 @@ def _against(state: VehicleState | None, mine: Whole, other: Other, now_s: float
     ]
     if not found:
         text = f"Its line comes near that of {name}, but by the predicted times not while {name} is there."
-        return _row("accept", text, f"Start now or once {name} has landed, and watch both.")
+        return _row("accept", text, f"{begin} now or once {name} has landed, and watch both.")
     met = min(found, key=lambda one: (one.distance_m, one.t_s))
-    text = f"Started now, it may come within {met.distance_m:.0f} m of {name} in {max(0.0, met.t_s - now_s):.0f} s,"
-    return _row("bad", f"{text} at {_place(origin_deg, met)}.", f"Start later, or land {name} first.")
+    text = f"{begun} now, it may come within {met.distance_m:.0f} m of {name} in {max(0.0, met.t_s - now_s):.0f} s,"
+    return _row("bad", f"{text} at {_place(origin_deg, met)}.", f"{begin} later, or land {name} first.")
 
 
 def _timed(mine: Whole, way_m: F64, now_s: float) -> list[TimedLine]:
@@ -147,9 +154,11 @@ def _timed(mine: Whole, way_m: F64, now_s: float) -> list[TimedLine]:
     line_m, home_m = way_m[: 1 - _HOME_POINTS], way_m[-_HOME_POINTS:]
     if mine.t_s is None:
         return [TimedLine(way_m, np.full(len(way_m), now_s + LONG_S), RADIUS_M, early_late_s=LONG_S)]
-    climbs = min(max(1, int(np.searchsorted(mine.t_s, mine.takeoff_s))), len(line_m) - 1)
-    up_s = now_s + np.linspace(0.0, mine.takeoff_s, climbs + 1)
-    parts = [TimedLine(line_m[: climbs + 1], up_s, RADIUS_M, early_late_s=EARLY_LATE_S + mine.takeoff_s)]
+    climbs, parts = 0, list[TimedLine]()
+    if mine.takeoff_s > 0.0:
+        climbs = min(max(1, int(np.searchsorted(mine.t_s, mine.takeoff_s))), len(line_m) - 1)
+        up_s = now_s + np.linspace(0.0, mine.takeoff_s, climbs + 1)
+        parts.append(TimedLine(line_m[: climbs + 1], up_s, RADIUS_M, early_late_s=EARLY_LATE_S + mine.takeoff_s))
     if climbs + 1 < len(line_m):
         span_s = EARLY_LATE_S + EARLY_LATE_SHARE * mine.takeoff_s
         parts.append(

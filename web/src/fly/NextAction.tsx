@@ -21,6 +21,7 @@ import { Outcome } from "../ui/Outcome";
 import {
   accepted,
   adopt,
+  areOthersAccepted,
   checkStart,
   LEASE,
   NEXT,
@@ -112,7 +113,7 @@ function Primary({ step, isCut }: { step: Step; isCut: boolean }) {
     case "pause":
       return plain("Pause", "pause", () => void pauseFlight());
     case "resume":
-      return plain("Resume", "play", () => void resumeFlight());
+      return plain("Resume", "play", () => void resumeFlight(), why !== undefined);
     case "wait":
       return plain(step.why, "clock", () => undefined, true);
   }
@@ -156,6 +157,7 @@ const presentStep = (): Step =>
     inAir: isInAir.value,
     mine: lease.value.mine,
     accepted: accepted.value,
+    othersAccepted: areOthersAccepted(),
     check_age_s: checkAge_s(),
     obstacle: uploadRefusal(),
   });

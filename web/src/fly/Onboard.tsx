@@ -1,6 +1,6 @@
 import { useSignal } from "@preact/signals";
 import { clearance, count, demanded, metres, number, withUnit } from "../format";
-import type { OnboardDoc, Rounded, TakenUpDoc } from "../messages";
+import type { CheckRow, OnboardDoc, Rounded, TakenUpDoc } from "../messages";
 import { adopted, fly, isInAir } from "../store/flying";
 import { pending } from "../store/outcomes";
 import { whyNotCommand, whyUnheard } from "../store/reach";
@@ -10,7 +10,15 @@ import { Check } from "../ui/fields";
 import { HoldButton } from "../ui/HoldButton";
 import { Icon } from "../ui/Icon";
 import { Section } from "../ui/Section";
-import { NEXT, checkStart, takeUpPlan, uploadPlan, uploadRefusal } from "../vehicle/orders";
+import {
+  NEXT,
+  acceptOthers,
+  areOthersAccepted,
+  checkStart,
+  takeUpPlan,
+  uploadPlan,
+  uploadRefusal,
+} from "../vehicle/orders";
 
 const SUMMARIES = { unknown: "not known", none: "none", verified: "verified" } as const;
 const MOST_ROWS = 40;
@@ -117,7 +125,28 @@ function TakenUp({ taken }: { taken: TakenUpDoc }) {
             {note}
           </p>
         ))}
+        {taken.others && <Others row={taken.others} />}
       </div>
+    </div>
+  );
+}
+
+/** The station's other vehicles, as they would be met if it were resumed now. */
+function Others({ row }: { row: CheckRow }) {
+  return (
+    <div data-testid="taken-up-others" data-state={row.state}>
+      <p>
+        {row.text} {row.mend}
+      </p>
+      {row.state === "accept" && (
+        <Check
+          label="I accept this"
+          checked={areOthersAccepted()}
+          disabled={whyNotCommand.value !== null}
+          testid="taken-up-accept-others"
+          onChange={acceptOthers}
+        />
+      )}
     </div>
   );
 }

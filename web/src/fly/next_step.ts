@@ -8,7 +8,7 @@ import {
   type VehicleState,
 } from "../messages";
 import { checklistObstacle } from "../store/checklist";
-import { isAcceptable, type Accepted } from "../vehicle/orders";
+import { isAcceptable, resumeObstacle, type Accepted } from "../vehicle/orders";
 
 /** What the page knows when it says what comes next. */
 export interface Facts {
@@ -20,6 +20,8 @@ export interface Facts {
   inAir: boolean;
   mine: boolean;
   accepted: ReadonlySet<Accepted>;
+  /** What is said of other vehicles where a plan was taken up is accepted. */
+  othersAccepted: boolean;
   /** How long ago the start was checked. */
   check_age_s: number;
   /** Why the open plan cannot be uploaded now; null: it can. */
@@ -51,7 +53,10 @@ function inFlight(facts: Facts): Step | null {
   if (phase === "taking_off") return { id: "pause" };
   if (phase === "flying") return { id: "pause" };
   if (phase === "paused" && facts.flight?.is_flown) return { id: "wait", why: "Choose the next way" };
-  if (phase === "paused") return { id: "resume" };
+  if (phase === "paused") {
+    const why = resumeObstacle(facts.fly?.taken_up?.others, facts.othersAccepted);
+    return why === undefined ? { id: "resume" } : { id: "resume", why };
+  }
   if (phase === "returning") return { id: "wait", why: "On the way home" };
   if (!facts.inAir) return null;
   return { id: "wait", why: `In the air in ${facts.vehicle?.mode || "an unknown mode"}, not by Hedgehop` };

@@ -1,5 +1,5 @@
 import { computed, signal } from "@preact/signals";
-import type { CheckRow, LeaseDoc, StartFlight, TakeUpPlan } from "../messages";
+import type { CheckRow, LeaseDoc, ResumeFlight, StartFlight, TakeUpPlan } from "../messages";
 import { fly } from "../store/flying";
 import { order, say } from "../store/outcomes";
 import { allSent } from "../store/plan";
@@ -68,8 +68,23 @@ export const stopMotors = () =>
 
 export const pauseFlight = () =>
   order({ place: NEXT, path: "/api/flight/pause", moves: true, done: "Paused: it holds its position." });
-export const resumeFlight = () =>
-  order({ place: NEXT, path: "/api/flight/resume", moves: true, done: "The flight goes on." });
+
+/** What is said of other vehicles where a plan was taken up, as it was accepted. */
+const othersAccepted = signal("");
+const others = () => fly.value?.taken_up?.others ?? null;
+export const areOthersAccepted = () => others() !== null && othersAccepted.value === others()?.text;
+export const acceptOthers = (yes: boolean) => (othersAccepted.value = yes ? (others()?.text ?? "") : "");
+
+/** Why a plan that was taken up is not resumed now. */
+export function resumeObstacle(row: CheckRow | null | undefined, isAccepted: boolean): string | undefined {
+  if (!row || row.state === "good" || (row.state === "accept" && isAccepted)) return undefined;
+  return row.state === "accept" ? "Tick what you accept under On board first" : row.text;
+}
+
+export function resumeFlight() {
+  const body: ResumeFlight = { accept: areOthersAccepted() ? ["others"] : [] };
+  return order({ place: NEXT, path: "/api/flight/resume", moves: true, body, done: "The flight goes on." });
+}
 
 /** Why nothing can be uploaded, by the verdict on the open plan. */
 export function uploadObstacle(verdict: VerdictKind): string | null {
