@@ -85,6 +85,8 @@ class FlightDesk:
         """How often parameters were written."""
         self._told: FlyState | None = None
         self._taken_up: TakenUpDoc | None = None
+        self._lists_sent: dict[PlaceList, tuple[Item, ...]] = {}
+        """Fence and rally points that were sent last, whatever came of it."""
 
     @property
     def state(self) -> FlyState:
@@ -104,7 +106,7 @@ class FlightDesk:
         before = self._aboard.vehicle
         self._aboard.on_link(status)
         if self._aboard.vehicle != before:
-            self._at_fence, self._taken_up = "", None
+            self._at_fence, self._taken_up, self._lists_sent = "", None, {}
             self._taking_up.forget()
         self._checklist.on_link(status, armed=self._live.state is not None and self._live.state.armed)
         if self._ready is not None and not _still_holds(self._ready, status):
@@ -262,6 +264,7 @@ class FlightDesk:
         """Only what was read back, and certified as such, is taken up."""
         for kind, items in made.places.items():
             self._taking_up.sends(places=True)
+            self._lists_sent[kind] = items
             report = await self._link.call(UploadPlaces(operator, kind, items, while_holding=True))
             if not report.verified:
                 raise _not_verified(report, _LISTS[kind])
@@ -292,16 +295,18 @@ class FlightDesk:
 
     async def _send_places(self, operator: Operator, made: MadeUpload) -> None:
         """Before the mission, which counts as on board only with them. A list that the plan does not have is left as it
-        is, unless it is that of the plan before."""
+        is, unless it is that of the plan before, or of one that was not taken up."""
         for kind, items in made.places.items():
             if not items and not await self._is_left_over(operator, kind, made.places_before[kind]):
                 continue
+            self._lists_sent[kind] = items
             report = await self._link.call(UploadPlaces(operator, kind, items))
             if not report.verified:
                 raise _not_verified(report, _LISTS[kind])
 
     async def _is_left_over(self, operator: Operator, kind: PlaceList, before: tuple[Item, ...]) -> bool:
-        return bool(before) and _marks(await self._link.call(DownloadPlaces(operator, kind))) == _marks(before)
+        ours = [_marks(items) for items in (before, self._lists_sent.get(kind, ())) if items]
+        return bool(ours) and _marks(await self._link.call(DownloadPlaces(operator, kind))) in ours
 
     async def _note(self) -> None:
         """What is on board now, for the recorder and for the next server."""

@@ -11,11 +11,16 @@ from typing import Any
 
 import pytest
 
+from planning.fence.fence_model import Fence, circle
+from planning.formats.fence_items import fence_items
 from server.errors import StorageError
-from server.schemas import RallyDoc, TakeUpPlan
+from server.schemas import FenceDoc, RallyDoc, TakeUpPlan
 from server.work.jobs import Lane
 from telemetry.errors import NotAllowedError, TransferError
+from telemetry.mavlink.items import wire_items
+from telemetry.mavlink.verify import as_stored
 from telemetry.topics.messages import FlightStatus, LinkStatus
+from telemetry.topics.onboard_lists import Item
 from telemetry.topics.requests import Pause, TakeUp
 from tests.server.flying_desk_bench import ME, QUAD, Bench, Made
 from tests.server.test_take_up_desk import (  # noqa: F401
@@ -101,6 +106,76 @@ def test_rally_points_that_were_sent_before_the_mission_failed_are_said(play: Pl
             await bench.desk.take_up(ME, AGAIN)
         assert "fence or rally points of the new plan were sent" in refused.value.advice
         assert "Resume is refused" in refused.value.advice
+
+    play(scenario)
+
+
+def fence_of(bench: Bench, radius_m: float) -> tuple[Item, ...]:
+    home_lat_deg, home_lon_deg = bench.made.home
+    return wire_items(
+        fence_items(Fence(circles=(circle(home_lat_deg, home_lon_deg, radius_m, inclusion=True, where="t"),)))
+    )
+
+
+def with_fence(bench: Bench, radius_m: float) -> None:
+    home_lat_deg, home_lon_deg = bench.made.home
+    round_home = {
+        "id": "c",
+        "centre": {"lat_deg": home_lat_deg, "lon_deg": home_lon_deg},
+        "radius_m": radius_m,
+        "inclusion": True,
+    }
+    with_document(bench, fence=FenceDoc.model_validate({"circles": [round_home]}))
+
+
+@pytest.mark.parametrize("crews_own", [False, True])
+def test_a_fence_that_a_failed_try_sent_does_not_stay_for_a_plan_without_one(play: Play, *, crews_own: bool) -> None:
+    """What was on board before that try counts again: nothing, or a fence that is no plan's."""
+
+    async def scenario(bench: Bench) -> None:
+        before = fence_of(bench, 900.0) if crews_own else ()
+        bench.vehicle.places["fence"] = before
+        without = bench.document
+        with_fence(bench, 700.0)
+        bench.vehicle.breaks_off = "keeps"
+        with pytest.raises(TransferError):
+            await bench.desk.take_up(ME, AGAIN)
+        assert len(bench.vehicle.places["fence"]) == 1
+        assert bench.vehicle.places["fence"] != before
+        bench.vehicle.breaks_off = ""
+        bench.plan = bench.plan.model_copy(update={"document": without})
+        state = await bench.desk.take_up(ME, AGAIN)
+        assert bench.vehicle.places["fence"] == as_stored(before, "ardupilot")
+        assert state.taken_up is not None
+        said = "is sent again, and counts" if crews_own else "The plan has no fence: what was on board is cleared."
+        assert said in " ".join(state.taken_up.notes)
+
+    play(scenario)
+
+
+def test_a_fence_that_is_no_plans_stays_and_that_is_said(play: Play) -> None:
+    async def scenario(bench: Bench) -> None:
+        bench.vehicle.places["fence"] = kept = fence_of(bench, 900.0)
+        state = await bench.desk.take_up(ME, AGAIN)
+        assert bench.vehicle.places["fence"] == kept
+        assert state.taken_up is not None
+        assert "The plan has no fence: what is on board stays, and counts." in state.taken_up.notes
+
+    play(scenario)
+
+
+def test_an_upload_after_the_landing_clears_the_fence_of_a_try_that_failed(play: Play) -> None:
+    async def scenario(bench: Bench) -> None:
+        without = bench.document
+        with_fence(bench, 700.0)
+        bench.vehicle.breaks_off = "keeps"
+        with pytest.raises(TransferError):
+            await bench.desk.take_up(ME, AGAIN)
+        bench.live.state = bench.made.standing()
+        bench.desk.on_disarmed()
+        bench.plan = bench.plan.model_copy(update={"document": without})
+        await bench.desk.upload(ME, 3)
+        assert bench.vehicle.places["fence"] == ()
 
     play(scenario)
 

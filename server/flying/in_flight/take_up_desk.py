@@ -51,6 +51,8 @@ class Before:
     record: PlanRecord | None
     item: int
     """That was flown to."""
+    places: PlacesOnboard | None = None
+    """Fence and rally points; None: not read yet."""
 
 
 class TakingUp:
@@ -115,6 +117,9 @@ class TakingUp:
         if before is not None and before.terrain_sha256 != terrain.sha256:
             what = f'The plan is over "{terrain.name}", the vehicle took off over "{before.terrain_name}".'
             raise NotAllowedError(what, where="surface model", advice="Plan over the model that the flight began over.")
+        places = await self._places(operator)
+        if self._sent == "nothing":
+            self._before = replace(self._before, places=places)
         asked = AskedTakeUp(
             self._library.terrain_dir(terrain.id),
             document,
@@ -124,7 +129,8 @@ class TakingUp:
             state,
             time.monotonic(),
             await self._link.call(ReadParameters(NAMES["px4" if state.autopilot == "px4" else "ardupilot"])),
-            await self._places(operator),
+            places,
+            self._before.places or places,
             await asyncio.to_thread(seen_maps, self._watch),
             home_of_takeoff(self._live.track.states),
         )

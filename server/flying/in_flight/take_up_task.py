@@ -50,6 +50,8 @@ class AskedTakeUp:
     now_mono_s: float
     parameters: dict[str, float | None]
     aboard: PlacesOnboard
+    before_tries: PlacesOnboard
+    """What was on board before any try of this flight sent a list: what a plan without one goes back to."""
     maps: tuple[Voxels, ...]
     took_off: HomePlace | None
     """The home that the flight began with."""
@@ -61,7 +63,7 @@ class MadeTakeUp:
     record: PlanRecord
     """Its digest is still empty: the vehicle's read-back gives it."""
     places: dict[PlaceList, tuple[Item, ...]]
-    """Fence and rally points that are sent before the mission; an empty list clears what the plan before had."""
+    """Fence and rally points that are sent before the mission; an empty list clears what is on board."""
     doc: TakenUpDoc
     begins: tuple[float, float, float]
     """lat_deg, lon_deg, alt_rel_home_m"""
@@ -100,7 +102,8 @@ def make_take_up(asked: AskedTakeUp, *, report: Progress) -> MadeTakeUp:
         passed_wpl=write_wpl(passed) if passed.items else "",
         passed_flown=flown_items,
     )
-    return MadeTakeUp(items_from_mission(read_wpl(text)), record, sent, _doc(found), found.begins)
+    doc = _doc(found, _list_notes(asked, sent, planned.firmware))
+    return MadeTakeUp(items_from_mission(read_wpl(text)), record, sent, doc, found.begins)
 
 
 def check_take_up(asked: AskedTakeUp, onboard: OnboardMission, *, report: Progress) -> str:
@@ -133,18 +136,42 @@ def _flown_items(before: PlanRecord, planned: Mission, next_item: int) -> int:
 
 
 def _sent(asked: AskedTakeUp, firmware: Firmware) -> dict[PlaceList, tuple[Item, ...]]:
-    """Fence and rally points of the plan, and nothing in place of those that only the plan before had."""
+    """Fence and rally points of the plan; where it has none, those that were on board before any try, without those of
+    the plan before. What is on board already is not sent again."""
     from telemetry.flight.preflight.fence_check import NOTHING, sent_places
     from telemetry.mavlink.verify import compare
 
     before = sent_places(NOTHING if asked.before is None else places_of(asked.before), firmware)
-    aboard: dict[PlaceList, tuple[Item, ...]] = {"fence": asked.aboard.fence, "rally": asked.aboard.rally}
     sent: dict[PlaceList, tuple[Item, ...]] = {}
     for kind, items in sent_places(fence_from_doc(asked.document), firmware).items():
-        is_left_over = bool(before[kind]) and not compare(before[kind], aboard[kind], firmware=firmware)[1]
-        if items or is_left_over:
+        aboard, kept = _list(asked.aboard, kind), _list(asked.before_tries, kind)
+        if not items and compare(before[kind], kept, firmware=firmware)[1]:
+            items = kept
+        if items != aboard:
             sent[kind] = items
     return sent
+
+
+def _list(places: PlacesOnboard, kind: PlaceList) -> tuple[Item, ...]:
+    return places.fence if kind == "fence" else places.rally
+
+
+def _list_notes(asked: AskedTakeUp, sent: dict[PlaceList, tuple[Item, ...]], firmware: Firmware) -> list[str]:
+    """What becomes of a list on board that the plan does not have."""
+    from telemetry.flight.preflight.fence_check import sent_places
+
+    notes = []
+    for kind, items in sent_places(fence_from_doc(asked.document), firmware).items():
+        name = "fence" if kind == "fence" else "rally points"
+        if items or not (_list(asked.aboard, kind) or sent.get(kind)):
+            continue
+        if not sent.get(kind, _list(asked.aboard, kind)):
+            notes.append(f"The plan has no {name}: what was on board is cleared.")
+        elif kind in sent:
+            notes.append(f"The plan has no {name}: what was on board before the tries is sent again, and counts.")
+        else:
+            notes.append(f"The plan has no {name}: what is on board stays, and counts.")
+    return notes
 
 
 def _flown(asked: AskedTakeUp, aboard: PlacesOnboard) -> Flown:
@@ -168,7 +195,7 @@ def _over(asked: AskedTakeUp) -> FlownOver:
     return FlownOver(ground, with_seen(ground, asked.directory, asked.document.seen_id, asked.maps, asked.state))
 
 
-def _doc(found: TakenUp) -> TakenUpDoc:
+def _doc(found: TakenUp, list_notes: list[str]) -> TakenUpDoc:
     from telemetry.flight.certified_way import way_notes
 
     battery = found.battery
@@ -179,7 +206,7 @@ def _doc(found: TakenUp) -> TakenUpDoc:
         left_out=found.joined.left_out,
         clearance_m=found.certificate.kept_m,
         required_m=found.certificate.required_clearance_m,
-        notes=way_notes(found.way),
+        notes=[*way_notes(found.way), *list_notes],
         battery=CheckRow(code="battery", state=battery.state, text=battery.text, mend=_LAND_SOON),
     )
 
