@@ -141,7 +141,7 @@ def test_what_crosses_its_way_is_passed_at_its_safety_radius() -> None:
         begun_s.clear()
         it = craft(crossing, by=by)
         begun_s.append(it.now_s)
-        it.until(partial(_is_past, it))
+        it.until(partial(is_past, it))
         if by == "climb":
             assert it.nearest_m < 2.5  # it really would come too near
         else:
@@ -149,7 +149,7 @@ def test_what_crosses_its_way_is_passed_at_its_safety_radius() -> None:
             assert "manoeuvre" in it.states
 
 
-def _is_past(it: Followed) -> bool:
+def is_past(it: Followed) -> bool:
     return it.truth[0] > 42.0
 
 

@@ -1,0 +1,83 @@
+"""Stepping aside by itself, on the simulated PX4: past a pole and what crosses, held, and back onto the line."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from tests.telemetry.px4_craft import Px4Craft
+from tests.telemetry.test_avoiding_aside import STANDS_M, Followed, Place, is_past, stands
+
+MEETS_S = 12.3
+"""Until it is 30 m north by itself."""
+
+
+class FollowedPx4(Followed, Px4Craft):
+    pass
+
+
+def px4_craft(*things: Place, by: str = "sidestep") -> FollowedPx4:
+    it = FollowedPx4(things)
+    it.start()
+    it.avoiding.enable(it.now_s, by)  # type: ignore[arg-type]
+    return it
+
+
+def test_it_passes_a_pole_dead_ahead_without_a_stop_and_comes_back_to_its_line() -> None:
+    it = px4_craft(stands(25.0, 0.0))
+    begun = len(it.trail)
+    it.until(lambda: it.state.mode == "RTL")
+    assert it.nearest_m >= STANDS_M * 0.9
+    assert it.mode_names() == ["HOLD", "RTL"]
+    assert it.pauses() == []
+    flown_m = [up_m for _, _, up_m in it.trail[begun:]]
+    assert min(flown_m) > 7.0
+    assert max(flown_m) < 9.5
+    back_m = [abs(e) for (_, n, _), e in zip(it.trail, it.asides, strict=True) if n > 40.0]
+    assert max(back_m) < 1.0
+    assert "manoeuvre" in it.states
+
+
+def test_two_poles_one_behind_the_other_and_beside_are_passed() -> None:
+    it = px4_craft(stands(22.0, 0.0), stands(26.0, 3.0), stands(34.0, -1.0))
+    it.until(lambda: it.state.mode == "RTL")
+    assert it.nearest_m >= STANDS_M * 0.85
+
+
+def test_what_crosses_its_way_is_passed_at_its_safety_radius() -> None:
+    for by in ("climb", "sidestep"):
+        begun_s: list[float] = []
+
+        def crossing(t_s: float, begun_s: list[float] = begun_s) -> tuple[float, float]:
+            return 30.0, 1.9 * (MEETS_S - (t_s - begun_s[0] if begun_s else 0.0))
+
+        it = px4_craft(crossing, by=by)
+        begun_s.append(it.now_s)
+        it.until(partial(is_past, it))
+        assert (it.nearest_m >= 2.7) == (by == "sidestep"), it.nearest_m
+
+
+def test_when_the_tracks_stop_it_holds_and_goes_on_when_they_come_again() -> None:
+    it = px4_craft(stands(25.0, 0.0))
+    it.until(lambda: it.avoiding.detour.phase == "aside", 60)
+    it.silent = True
+    it.until(lambda: it.avoiding.status.state == "holding", 10)
+    it.until(lambda: (it.state.ground_speed_m_s or 0.0) < 0.3, 20)
+    at_m = it.truth[0]
+    it.advance(5.0)
+    assert abs(it.truth[0] - at_m) < 1.0
+    it.silent = False
+    it.until(lambda: it.state.mode == "RTL")
+    assert it.nearest_m >= STANDS_M * 0.8
+
+
+def test_a_pause_on_the_way_aside_can_be_ended() -> None:
+    it = px4_craft(stands(25.0, 0.0))
+    it.until(lambda: it.avoiding.detour.phase == "aside", 60)
+    it.advance(1.0)
+    it.perform(it.avoiding.pause(it.now_s))
+    it.until(lambda: (it.state.ground_speed_m_s or 0.0) < 0.3, 20)
+    assert it.avoiding.status.state == "holding"
+    it.advance(3.0)
+    it.perform(it.avoiding.resume(it.now_s))
+    it.until(lambda: it.state.mode == "RTL")
+    assert it.nearest_m >= STANDS_M * 0.8
