@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from planning.errors import DescribedError
 from server.door.hub import Hub
 from server.door.lease import Lease
 from server.door.operators import Operators
@@ -145,7 +146,7 @@ class Flying:
         self._watch = self._obstacles.watches["live"]
         work = FlightWork(library, link, workspace, lane)
         taking_up = TakingUp(link, self.live, workspace, library, lane, self._watch, aboard)
-        checklist = ChecklistDesk(link, shared.checklists, aboard, bus)
+        self._checklist = checklist = ChecklistDesk(link, shared.checklists, aboard, bus)
         alone = wanted.is_alone
         self.desk = FlightDesk(
             link, work, aboard, checklist, workspace, self.live, self._watch, bus, present, taking_up, is_alone=alone
@@ -187,6 +188,7 @@ class Flying:
             *self._relay().loops(),
             self.nodes.supervisor.run(),
             self._beat(),
+            self._log_checklists(),
             self._hear_of_nodes(),
             self._followed.run(),
             self.logs.run(),
@@ -224,6 +226,17 @@ class Flying:
             self._obstacles.tick()
             await self.operators.look()
             await asyncio.sleep(ALIVE_EVERY_S)
+
+    async def _log_checklists(self) -> None:
+        """Changed texts, in the log of the first vehicle, as soon as its link is there to write it."""
+        while self.number == FIRST_VEHICLE:
+            await asyncio.sleep(ALIVE_EVERY_S)
+            if self.connections.status is None or not self.nodes.link_answers:
+                continue
+            try:
+                await self._checklist.log_changes(self.lease.server_operator())
+            except DescribedError as error:
+                log.warning("A changed checklist is not in the log of commands yet: %s", error)
 
     def on_plan(self) -> None:
         """Another document is open, or there is another answer to it."""

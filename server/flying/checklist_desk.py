@@ -6,6 +6,7 @@ disk: a server that starts anew asks for them again, as it asks for the check.
 
 from __future__ import annotations
 
+import asyncio
 import time
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -101,6 +102,16 @@ class ChecklistDesk:
         if len(self._ticked) == len(asked.points):
             self._why_again = ""
         self._publish()
+
+    async def log_changes(self, operator: Operator) -> None:
+        """Texts that were changed since stand in the log of commands, whether anybody ticks them or not.
+
+        Raises what keeps them from it: they are written at the next call.
+        """
+        for profile, change in self._lists.unlogged:
+            told = change.points, change.revision, change.by, change.utc
+            await self._link.call(NoteChecklist(operator, profile, *told, changed=True))
+            await asyncio.to_thread(self._lists.logged, profile, change)
 
     async def _note(self, operator: Operator, asked: _Asked) -> None:
         """Who wrote what is ticked is in the log before the first tick of it: a change by somebody shows there."""

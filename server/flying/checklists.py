@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
@@ -16,7 +16,17 @@ from server.library.whole_files import storage_errors, write_atomically
 from telemetry.topics.checklist import ChecklistPoint, points_of
 
 FILE = "checklists.json"
-MOST_LISTS = 200
+MOST_LISTS, MOST_UNLOGGED = 200, 500
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """A text that took the place of another one."""
+
+    revision: str
+    points: int
+    by: str
+    utc: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +36,8 @@ class KeptChecklist:
     """The text that the last change replaced, so that it can be taken back."""
     changed_by: str = ""
     changed_utc: str = ""
+    unlogged: tuple[Change, ...] = ()
+    """Of which the log of commands does not know yet: it is kept by the link, which need not run."""
 
     @property
     def revision(self) -> str:
@@ -76,14 +88,34 @@ class Checklists:
             if text == now.text:
                 return now
             kept = KeptChecklist(text, now.text if now.changed_utc else None, by, utc_now())
+            if len(now.unlogged) >= MOST_UNLOGGED:
+                advice = "Connect to a vehicle once: what was changed is written down then."
+                raise ConflictError(f"{MOST_UNLOGGED} changes wait for the log of commands.", advice=advice)
+            change = Change(kept.revision, len(points), by, kept.changed_utc)
+            kept = replace(kept, unlogged=(*now.unlogged, change))
             lists = self._lists | {profile: kept}
             if len(lists) > MOST_LISTS:
                 advice = f"Remove those that nobody needs from {FILE} while Hedgehop does not run."
                 raise ConflictError(f"There are {MOST_LISTS} checklists already.", advice=advice)
-            write_atomically(self._file, msgspec.json.format(msgspec.json.encode(lists)))
+            self._keep(lists)
             self._points = self._points | {profile: points}
-            self._lists = lists
         return kept
+
+    @property
+    def unlogged(self) -> list[tuple[str, Change]]:
+        """Changes of which the log of commands does not know yet, each with its profile, in their order."""
+        return [(profile, change) for profile, kept in self._lists.items() for change in kept.unlogged]
+
+    def logged(self, profile: str, change: Change) -> None:
+        """The log of commands knows of it. Blocks. Raises StorageError."""
+        with self._change:
+            kept = self._lists[profile]
+            left = tuple(each for each in kept.unlogged if each != change)
+            self._keep(self._lists | {profile: replace(kept, unlogged=left)})
+
+    def _keep(self, lists: dict[str, KeptChecklist]) -> None:
+        write_atomically(self._file, msgspec.json.format(msgspec.json.encode(lists)))
+        self._lists = lists
 
     def _check(self) -> None:
         if self._fault is not None:

@@ -244,10 +244,12 @@ class Answering:
         await self._record(request, f"{what} {point}{f' (by {request.by})' if request.by else ''}")
 
     async def _note_checklist(self, request: requests.NoteChecklist) -> None:
-        self._link.need_session()
+        if not request.changed:
+            self._link.need_session()
         text = f"{request.points} points, SHA-256 {request.digest[:12]}"
         written = f"written by {request.written_by} at {request.written_utc}"
-        await self._record(request, f"ticks the checklist of {request.profile}: {text}, {written}")
+        does = "notes a change of" if request.changed else "ticks"
+        await self._record(request, f"{does} the checklist of {request.profile}: {text}, {written}")
 
     async def _start_auto(self, request: requests.StartAuto) -> None:
         session = self._link.need_session()

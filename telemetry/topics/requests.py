@@ -206,7 +206,7 @@ class TickPoint(OperatorRequest):
 
 @dataclass(frozen=True, slots=True)
 class NoteChecklist(OperatorRequest):
-    """Writes down which text of a profile's checklist is ticked from here on. -> None"""
+    """Writes down which text of a profile's checklist is ticked from here on, or that it was changed. -> None"""
 
     profile: str
     points: int
@@ -215,6 +215,8 @@ class NoteChecklist(OperatorRequest):
     written_by: str
     written_utc: str
     """ISO 8601"""
+    changed: bool = False
+    """Nobody has ticked it yet, and there need be no vehicle."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from server.errors import BadRequestError, CheckNeededError, StorageError
+from server.errors import BadRequestError, CheckNeededError, ConflictError, StorageError
 from server.flying.checklist_desk import ChecklistDesk
 from server.flying.checklists import FILE, Checklists
 from server.heard.onboard import Aboard, onboard
@@ -43,6 +43,7 @@ class Desk:
         self.lists, self.aboard = Checklists(root), Aboard(root / "onboard.json")
         self.asked: list[TickPoint] = []
         self.noted: list[NoteChecklist] = []
+        self.changes: list[NoteChecklist] = []
         self.published: list[ChecklistRecord] = []
         self.refusal: Exception | None = None
         self.meanwhile: Callable[[], object] = lambda: None
@@ -54,6 +55,9 @@ class Desk:
     async def call(self, request: Any) -> None:
         if self.refusal is not None:
             raise self.refusal
+        if isinstance(request, NoteChecklist) and request.changed:
+            self.changes.append(request)
+            return
         if isinstance(request, NoteChecklist):
             self.noted.append(request)
             return
@@ -282,3 +286,35 @@ def test_each_vehicle_of_a_station_is_ticked_for_itself_by_the_one_list(tmp_path
     for desk in (first, second):
         assert "The list was changed" in desk.doc.why_again
         assert set(desk.ticked_by) == {""}
+
+
+def test_a_text_that_is_changed_and_never_ticked_is_in_the_log_once_the_link_is_there(tmp_path: Path) -> None:
+    first = Desk(tmp_path)
+    first.write(LIST)
+    first.refusal = RecordingFullError("No space is left.")
+    with pytest.raises(RecordingFullError):
+        asyncio.run(first.desk.log_changes(BEN))
+    first.write("")
+    again = Desk(tmp_path)  # a server that is started anew
+    asyncio.run(again.desk.log_changes(BEN))
+    assert [(each.profile, each.points, each.written_by) for each in again.changes] == [
+        ("Quad", 3, "Anna"),
+        ("Quad", 0, "Anna"),
+    ]
+    assert again.changes[0].digest != again.changes[1].digest == again.lists.of("Quad").revision
+    assert again.asked == again.noted == []
+    asyncio.run(again.desk.log_changes(BEN))
+    asyncio.run(Desk(tmp_path).desk.log_changes(BEN))
+    assert len(again.changes) == 2, "each once"
+
+
+def test_so_many_changes_without_a_log_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.flying.checklists.MOST_UNLOGGED", 2)
+    desk = Desk(tmp_path)
+    desk.write("One\n")
+    desk.write("Two\n")
+    with pytest.raises(ConflictError, match="2 changes wait for the log of commands"):
+        desk.write("Three\n")
+    assert desk.lists.of("Quad").text == "Two\n"
+    asyncio.run(desk.desk.log_changes(BEN))
+    desk.write("Three\n")
