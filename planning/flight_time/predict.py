@@ -11,6 +11,7 @@ from planning.basics.mav_cmd import AMSL_FRAMES, HOME_FRAMES, MavCmd
 from planning.basics.plan_model import Home, Mission, MissionItem, VehicleProfile
 from planning.errors import MissionError
 from planning.flight_time.corner_speeds import corner_leg_times
+from planning.flight_time.return_speeds import ReturnPace, ReturnSpeeds, planned_pace, worse_pace
 from planning.flight_time.scurve import Axes, leg, overlap_s
 from planning.terrain.dsm import Dsm
 
@@ -20,9 +21,6 @@ CORNER_SHARE = 2.0
 """Corner over straight acceleration (WPNAV_ACCEL_C 0)."""
 WAYPOINT_RADIUS_M = 2.0
 """WPNAV_RADIUS; PX4's NAV_ACC_RAD as well."""
-LAND_SPEED_M_S = 0.5
-LAND_SLOW_BELOW_M = 10.0
-RTL_WAIT_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +53,12 @@ class _Flight:
 
 
 def predict_duration(
-    mission: Mission, profile: VehicleProfile, dsm: Dsm, *, waypoint_radius_m: float = WAYPOINT_RADIUS_M
+    mission: Mission,
+    profile: VehicleProfile,
+    dsm: Dsm,
+    *,
+    waypoint_radius_m: float = WAYPOINT_RADIUS_M,
+    returns: ReturnSpeeds | None = None,
 ) -> PredictedTime:
     """Predict the times of a mission of take-off, waypoints and return.
 
@@ -65,7 +68,7 @@ def predict_duration(
     hold stops the vehicle. Against a recorded ArduCopter flight of 85 waypoints 2.5 m apart the sum
     is within 0.5 % and nearly every leg within 0.05 s, with the autopilot's defaults and no fitted
     factor. PX4: speeds at corners by their angle, braking between them (``corner_speeds``);
-    not checked against a flight.
+    not checked against a flight. ``returns``: how the vehicle itself returns, None while it is only planned.
     """
     flight = _read(mission, profile, dsm)
     axes = _axes(profile)
@@ -74,7 +77,8 @@ def predict_duration(
     takeoff_s = _rest_to_rest(flight.takeoff_m, axes)
     takeoff_s += _rest_to_rest(flight.points_m[0] - flight.takeoff_m, axes) + float(flight.hold_s[0])
     last = flight.transit_from
-    return_s = float(reached_s[-1] - reached_s[last]) + _way_home(flight, profile, axes)
+    pace = planned_pace(profile) if returns is None else worse_pace(returns, profile)
+    return_s = float(reached_s[-1] - reached_s[last]) + _way_home(flight, profile, axes, pace)
     flight_s = float(reached_s[last])
     return PredictedTime(
         total_s=takeoff_s + flight_s + return_s,
@@ -167,18 +171,19 @@ def _rest_to_rest(delta_m: F64, axes: Axes) -> float:
     return leg(delta_m, axes).duration_s if np.linalg.norm(delta_m) > 1e-6 else 0.0
 
 
-def _way_home(flight: _Flight, profile: VehicleProfile, axes: Axes) -> float:
-    """Climb to the return height, straight home, a wait, down, and slowly for the last ten metres."""
+def _way_home(flight: _Flight, profile: VehicleProfile, axes: Axes, pace: ReturnPace) -> float:
+    """Climb to the return height, straight home, a wait, down, and slowly for the last metres."""
     x, y, alt_m = flight.points_m[-1].tolist()
     if not flight.lands_by_rtl:
-        return _rest_to_rest(np.array([x, y, 0.0]), axes) + _descent(alt_m, axes)
+        return _rest_to_rest(np.array([x, y, 0.0]), axes) + _descent(alt_m, pace)
+    axes = replace(axes, speed_m_s=pace.level_m_s, climb_m_s=pace.climb_m_s)
     # A vehicle above its return height keeps its own.
     return_m = max(alt_m, profile.rtl_height_m)
     climb_s = _rest_to_rest(np.array([0.0, 0.0, return_m - alt_m]), axes)
-    return climb_s + _rest_to_rest(np.array([x, y, 0.0]), axes) + RTL_WAIT_S + _descent(return_m, axes)
+    return climb_s + _rest_to_rest(np.array([x, y, 0.0]), axes) + pace.wait_s + _descent(return_m, pace)
 
 
-def _descent(from_m: float, axes: Axes) -> float:
-    slow_m = min(max(from_m, 0.0), LAND_SLOW_BELOW_M)
+def _descent(from_m: float, pace: ReturnPace) -> float:
+    slow_m = min(max(from_m, 0.0), pace.slow_below_m)
     fast_m = max(0.0, from_m - slow_m)
-    return slow_m / LAND_SPEED_M_S + (fast_m / axes.descent_m_s + axes.descent_m_s / VERTICAL_ACCEL_M_S2 / 2)
+    return slow_m / pace.land_m_s + (fast_m / pace.descent_m_s + pace.descent_m_s / VERTICAL_ACCEL_M_S2 / 2)

@@ -17,6 +17,7 @@ from mapping.perceiving.braking import Braking
 from planning.basics.plan_model import Mission
 from planning.certificate.as_json import certificate_json
 from planning.certificate.certificate_model import Certificate, ClearanceParams
+from planning.flight_time.return_speeds import ReturnSpeeds
 from planning.formats.trajectory_csv import read_trajectory
 from planning.formats.wpl import read_wpl, write_wpl
 from planning.margins.words import rounded_down, rounded_up
@@ -69,6 +70,8 @@ class Checked:
     """Why waypoints cannot be handed over one at a time: the line is followed less closely then. Empty: they can."""
     at_fence: str = ""
     """What the vehicle does when it crosses its fence; empty: not read."""
+    returns: ReturnSpeeds = field(default_factory=ReturnSpeeds)
+    """At which the vehicle comes home."""
 
 
 def check_start(
@@ -84,7 +87,7 @@ def check_start(
 ) -> Checked:
     """``rereferenced_m``: by how much the heights of what is on board were moved already."""
     from telemetry.flight.preflight.fence_check import at_fence
-    from telemetry.flight.preflight.parameters import flown_speeds
+    from telemetry.flight.preflight.parameters import flown_speeds, return_speeds
     from telemetry.flight.preflight.preflight import check
 
     report("Checking the start", None)
@@ -121,6 +124,7 @@ def check_start(
         braking,
         not_guided="" if found.certificate is None else _not_guided(record, found.certificate),
         at_fence=at_fence(parameters, record.firmware),
+        returns=return_speeds(parameters, record.firmware),
     )
 
 

@@ -12,6 +12,7 @@ from collections.abc import AsyncIterator, Collection
 from dataclasses import replace
 
 from planning.errors import DescribedError
+from planning.flight_time.return_speeds import ReturnSpeeds
 from server.errors import CheckNeededError, ConflictError
 from server.flying.apart.other_vehicles import PENDING
 from server.flying.check_task import Checked
@@ -106,7 +107,7 @@ class FlightDesk:
         before = self._aboard.vehicle
         self._aboard.on_link(status)
         if self._aboard.vehicle != before:
-            self._at_fence, self._taken_up, self._lists_sent = "", None, {}
+            self._at_fence, self._taken_up, self._lists_sent, self._live.returns = "", None, {}, ReturnSpeeds()
             self._taking_up.forget()
         self._checklist.on_link(status, armed=self._live.state is not None and self._live.state.armed)
         if self._ready is not None and not _still_holds(self._ready, status):
@@ -136,7 +137,7 @@ class FlightDesk:
 
     def on_parameters(self) -> None:
         """Some were written, or may have been: what was checked before may not hold any more."""
-        self._ready, self._at_fence = None, ""
+        self._ready, self._at_fence, self._live.returns = None, "", ReturnSpeeds()
         self._written += 1
         self.refresh()
 
@@ -197,7 +198,7 @@ class FlightDesk:
                 raise CheckNeededError("Another vehicle was adopted during the check.", advice="Press Check again.")
             if written != self._written:
                 raise CheckNeededError("Parameters were written during the check.", advice="Press Check again.")
-            self._at_fence = checked.at_fence
+            self._at_fence, self._live.returns = checked.at_fence, checked.returns
             self._ready = Ready(checked, self._aboard.digest, vehicle, state, time.monotonic())
             if checked.certificate_json:
                 self._aboard.certified(checked.certificate_json)
@@ -340,8 +341,7 @@ class FlightDesk:
         return StartAuto(operator, body.digest, from_item, climb_to_m)
 
     def _state(self) -> VehicleState:
-        state = self._live.state
-        if state is None:
+        if (state := self._live.state) is None:
             raise NoVehicleError("No vehicle is connected.", advice="Connect one first.")
         return state
 

@@ -20,7 +20,7 @@ from server.schemas import (
     VehicleMessage,
 )
 from server.work.bucket import Bucket
-from telemetry.flight.health import Health, HealthRow
+from telemetry.flight.health import NOT_READ, Health, HealthRow
 from telemetry.topics.messages import FlightStatus, VehicleText
 from telemetry.topics.vehicle import VehicleState
 
@@ -62,6 +62,8 @@ class Channel:
         self._waiting: asyncio.TimerHandle | None = None
         self._told_mono_s = float("-inf")
         self.follower = Follower()
+        self.returns = NOT_READ
+        """How the vehicle returns, as its settings were read last."""
         self.track = Track()
         self._health, self._health_told = Health(), HealthTold()
         self.state: VehicleState | None = None
@@ -160,7 +162,8 @@ class Channel:
             return
         live_mono_s = self._told_mono_s if self._source == "live" else None
         state = self.state
-        rows = () if state is None else self._health.rows(state, self.follower.profile, now_mono_s=live_mono_s)
+        profile, returns = self.follower.profile, self.returns
+        rows = () if state is None else self._health.rows(state, profile, now_mono_s=live_mono_s, returns=returns)
         if rows != self._health_told.rows:
             self._pages.publish(HealthMessage(source=self._source, rows=list(rows)))
         self._health_told = HealthTold(self._told_mono_s, rows)

@@ -13,6 +13,7 @@ from typing import Literal, NamedTuple
 
 from mapping.geometry.frames import offset_m
 from planning.basics.plan_model import ANY_VEHICLE, VehicleProfile
+from planning.flight_time.return_speeds import ReturnSpeeds, worse_pace
 from telemetry.topics.vehicle import Autopilot, GnssFix, VehicleState
 
 Code = Literal["ready", "estimator", "gnss", "vibration", "battery", "wind"]
@@ -42,10 +43,9 @@ WIND_NEAR, WIND_BAD = 0.5, 0.8
 """Of the vehicle's largest speed: what is left of it must bring it home."""
 MEASURED_S, MEASURED_SHARE = 60.0, 0.03
 """A battery's use is measured once it went down by so much in so long: it is told in whole percents."""
-LAST_METRES_M, LAST_METRES_M_S = 10.0, 0.5
-"""Autopilots land slowly at the end."""
 SLOWEST_HOME_M_S = 0.5
 NEAR_HOME_S = 60.0
+NOT_READ = ReturnSpeeds()
 ROUNDED_S = 0.01
 """So little more or less makes no other second of what is rounded to its worse end."""
 
@@ -84,10 +84,16 @@ class Health:
             self._clipped.popleft()
 
     def rows(
-        self, state: VehicleState, profile: VehicleProfile | None = None, *, now_mono_s: float | None = None
+        self,
+        state: VehicleState,
+        profile: VehicleProfile | None = None,
+        *,
+        now_mono_s: float | None = None,
+        returns: ReturnSpeeds = NOT_READ,
     ) -> tuple[HealthRow, ...]:
         """In the order in which a pilot looks. ``profile``: the vehicle that the plan aboard was made for, None: not
-        known. ``now_mono_s``: the state's clock; None for recordings, whose newest word stands for it."""
+        known. ``now_mono_s``: the state's clock; None for recordings, whose newest word stands for it. ``returns``: as
+        it was last read how the vehicle returns."""
         who = profile or ANY_VEHICLE
         heard = _Heard(_newest_mono_s(state) if now_mono_s is None else now_mono_s)
         old_wind = heard.if_told("wind", state.wind_t_mono_s)
@@ -98,7 +104,8 @@ class Health:
             heard.row("estimator", state.estimator_t_mono_s) or _estimator(state),
             heard.row("gnss", state.gnss_t_mono_s) or _gnss(state, who),
             heard.row("vibration", state.vibration_t_mono_s) or self._vibration(state),
-            heard.row("battery", state.battery_t_mono_s) or self._battery(state, who, is_known=profile is not None),
+            heard.row("battery", state.battery_t_mono_s)
+            or self._battery(state, who, returns, is_known=profile is not None),
             old_wind or _wind(state, who),
         )
 
@@ -118,7 +125,9 @@ class Health:
             return HealthRow("vibration", "near", value, limit, "Look at rotors and mounting before the next flight.")
         return HealthRow("vibration", "good", value, limit)
 
-    def _battery(self, state: VehicleState, profile: VehicleProfile, *, is_known: bool) -> HealthRow:
+    def _battery(
+        self, state: VehicleState, profile: VehicleProfile, returns: ReturnSpeeds, *, is_known: bool
+    ) -> HealthRow:
         """At the worse end of the vehicle's endurance as set and as this flight uses it up."""
         if state.battery_share is None:
             value = "Not told" if state.battery_v is None else f"{state.battery_v:.1f} V"
@@ -133,7 +142,7 @@ class Health:
             return HealthRow("battery", _by_share(share, profile), told, over)
         left_s = max(0.0, share - profile.reserve_share) * min(known_s)
         value = f"{told}, {_minutes(left_s + ROUNDED_S)} to the reserve"
-        home_s = way_home_s(state, profile)
+        home_s = way_home_s(state, profile, returns)
         if home_s is None:
             return HealthRow("battery", _by_share(share, profile), value, over)
         still = " in still air, for the wind is not known" if state.wind_speed_m_s is None else ""
@@ -152,8 +161,10 @@ class Health:
         return None if lasted_s < MEASURED_S or used < MEASURED_SHARE else lasted_s / used
 
 
-def way_home_s(state: VehicleState, profile: VehicleProfile) -> float | None:
+def way_home_s(state: VehicleState, profile: VehicleProfile, returns: ReturnSpeeds = NOT_READ) -> float | None:
     """Seconds to home and onto the ground by the way that autopilots return: up, straight, down. None: not known.
+
+    At the vehicle's own speeds as far as they are known, at the worse end otherwise.
 
     The wind that the vehicle tells blows against it, whatever its direction: it may turn. One that it does not tell
     is taken for none, which whoever shows this has to say.
@@ -164,10 +175,12 @@ def way_home_s(state: VehicleState, profile: VehicleProfile) -> float | None:
     if height_m is None or not state.armed:
         return None
     away_m = math.hypot(*offset_m((state.lat_deg, state.lon_deg), state.home_lat_deg, state.home_lon_deg))
-    speed_m_s = max(SLOWEST_HOME_M_S, profile.max_speed_m_s - (state.wind_speed_m_s or 0.0))
+    pace = worse_pace(returns, profile)
+    # Autopilots hold their speed over ground as long as the wind lets them.
+    against_m_s = max(SLOWEST_HOME_M_S, profile.max_speed_m_s - (state.wind_speed_m_s or 0.0))
     top_m = max(height_m, profile.rtl_height_m)
-    down_s = max(0.0, top_m - LAST_METRES_M) / profile.max_descent_m_s + min(top_m, LAST_METRES_M) / LAST_METRES_M_S
-    return away_m / speed_m_s + (top_m - height_m) / profile.max_climb_m_s + down_s
+    down_s = max(0.0, top_m - pace.slow_below_m) / pace.descent_m_s + min(top_m, pace.slow_below_m) / pace.land_m_s
+    return away_m / min(pace.level_m_s, against_m_s) + (top_m - height_m) / pace.climb_m_s + pace.wait_s + down_s
 
 
 class _Heard:

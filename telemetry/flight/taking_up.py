@@ -16,6 +16,7 @@ from planning.basics.plan_model import Firmware, Home, Mission
 from planning.certificate.certificate_model import Certificate, ClearanceParams
 from planning.certificate.clearance import certify
 from planning.flight_time.predict import predict_duration
+from planning.flight_time.return_speeds import ReturnSpeeds
 from planning.formats.commands import has_position
 from planning.guided.guided_model import GuidedWay, Join
 from planning.missions.flown import flown_line
@@ -27,6 +28,7 @@ from planning.terrain.holes import fill_holes
 from telemetry.errors import NotAllowedError
 from telemetry.flight.certified_way import Flown, demanded, judged_way
 from telemetry.flight.preflight import checks
+from telemetry.flight.preflight.parameters import return_speeds
 from telemetry.flight.preflight.preflight import actual_home
 from telemetry.flight.preflight.rereference import rereference
 from telemetry.mavlink.items import mission_from_onboard
@@ -91,7 +93,8 @@ def taken_up(
     places = [Place(lat, lon, home.alt_dsm_m + up_m) for lat, lon, up_m in way.places[1 if way.rises_m > 0.0 else 0 :]]
     rest = joined_mission(mission, joined, places, most_items=flown.profile.max_items)
     certificate = _certified(part, rest, demanded(state, flown))
-    battery = checks.battery_row(state, flown.profile, _left_s(rest, flown, part.filled))
+    returns = return_speeds(flown.parameters, mission.firmware)
+    battery = checks.battery_row(state, flown.profile, _left_s(rest, flown, part.filled, returns))
     return TakenUp(rest, way.places[0], way, joined, certificate, battery)
 
 
@@ -166,9 +169,9 @@ def _xy(ground: Dsm, lat_deg: float | None, lon_deg: float | None) -> Sequence[f
     return ground.xy_from_lat_lon(np.array([[lat_deg, lon_deg]]))[0].tolist()
 
 
-def _left_s(mission: Mission, flown: Flown, dsm: Dsm) -> float:
+def _left_s(mission: Mission, flown: Flown, dsm: Dsm, returns: ReturnSpeeds) -> float:
     """From its first item to the ground at home."""
-    predicted = predict_duration(mission, flown.profile, dsm)
+    predicted = predict_duration(mission, flown.profile, dsm, returns=returns)
     return predicted.flight_s + predicted.return_s
 
 

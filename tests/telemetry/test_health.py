@@ -8,13 +8,14 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from planning.basics.plan_model import VehicleProfile
+from planning.flight_time.return_speeds import ReturnSpeeds
 from telemetry.flight.health import Health, HealthRow, way_home_s
 from telemetry.mavlink.reduce import reduce
 from telemetry.topics.vehicle import VehicleState
 
 PROFILE = VehicleProfile(
-    "test", max_speed_m_s=10.0, max_climb_m_s=2.0, max_descent_m_s=1.0, endurance_s=1000.0, reserve_share=0.2,
-    position_error_m=1.0, rtl_height_m=30.0,
+    "test", mean_speed_m_s=10.0, max_speed_m_s=10.0, max_climb_m_s=2.0, max_descent_m_s=1.0, endurance_s=1000.0,
+    reserve_share=0.2, position_error_m=1.0, rtl_height_m=30.0,
 )  # fmt: skip
 M_PER_DEG = 111_194.9266
 
@@ -43,7 +44,7 @@ def test_all_is_well_in_words() -> None:
         ("good", "0.10 (velocity)", "under 0.8"),
         ("good", "RTK fixed, ±0.02 m, height ±0.03 m", "within 1 m"),
         ("good", "6.0 m/s²", "under 30 m/s²"),
-        ("good", "90 %, 11 min 40 s to the reserve", "way home 1 min 10 s"),
+        ("good", "90 %, 11 min 40 s to the reserve", "way home 1 min 15 s"),
         ("good", "2.0 m/s from 090°", "under 5.0 m/s"),
     ]
 
@@ -120,15 +121,26 @@ def test_what_fell_silent_long_before_the_rest_is_not_believed_in_a_recording_ei
 
 @pytest.mark.parametrize("changes", [{"wind_speed_m_s": None}, {"wind_t_mono_s": 88.0}])
 def test_a_way_home_without_a_known_wind_says_that_it_counts_on_none(changes) -> None:
-    assert row("battery", **changes).limit == "way home 1 min 05 s in still air, for the wind is not known"
+    assert row("battery", **changes).limit == "way home 1 min 10 s in still air, for the wind is not known"
 
 
 def test_the_way_home_is_up_across_against_the_wind_and_down_slowly_at_the_end() -> None:
-    assert way_home_s(state(), PROFILE) == pytest.approx(10 / 2 + 200 / 8 + 20 / 1 + 10 / 0.5, rel=1e-3)
-    assert way_home_s(state(wind_speed_m_s=30.0), PROFILE) == pytest.approx(5 + 200 / 0.5 + 40, rel=1e-3)
-    assert way_home_s(state(alt_rel_home_m=60.0), PROFILE) == pytest.approx(200 / 8 + 50 + 20, rel=1e-3)
+    down_s = 5 + 20 / 1 + 10 / 0.5
+    assert way_home_s(state(), PROFILE) == pytest.approx(10 / 2 + 200 / 8 + down_s, rel=1e-3)
+    assert way_home_s(state(wind_speed_m_s=30.0), PROFILE) == pytest.approx(5 + 200 / 0.5 + down_s, rel=1e-3)
+    assert way_home_s(state(alt_rel_home_m=60.0), PROFILE) == pytest.approx(200 / 8 + 30 + down_s, rel=1e-3)
     assert way_home_s(state(home_lat_deg=None), PROFILE) is None
     assert way_home_s(state(armed=False), PROFILE) is None
+
+
+def test_the_way_home_is_flown_at_the_vehicles_own_speeds_and_at_the_worse_end_where_they_are_not_read() -> None:
+    own = ReturnSpeeds(4.0, 1.0, 0.5, 0.3, 5.0, 2.0)
+    assert way_home_s(state(), PROFILE, own) == pytest.approx(10 / 1 + 200 / 4 + 2 + 25 / 0.5 + 5 / 0.3, rel=1e-3)
+    assert way_home_s(state(wind_speed_m_s=7.0), PROFILE, own) == pytest.approx(78.667 + 200 / 3, rel=1e-3)
+    fast = ReturnSpeeds(25.0, 9.0, 9.0, 0.5, 10.0, 5.0)
+    assert way_home_s(state(), PROFILE, fast) == way_home_s(state(), PROFILE, ReturnSpeeds(10.0)), "as the profile may"
+    slower = replace(PROFILE, mean_speed_m_s=4.0)
+    assert way_home_s(state(), slower) == pytest.approx(5 + 200 / 4 + 45, rel=1e-3)
 
 
 def test_a_battery_that_goes_down_faster_than_set_counts_as_it_goes_down() -> None:

@@ -10,6 +10,7 @@ from planning.basics.mav_cmd import MavCmd
 from planning.basics.plan_model import Firmware
 from planning.certificate.commands import STRAIGHT
 from planning.certificate.returns import NEAR_M, SLOPE
+from planning.flight_time.return_speeds import ReturnSpeeds
 from telemetry.flight.guided.script_targets import GROUND_SPEEDS
 from telemetry.topics.onboard_lists import OnboardMission
 
@@ -17,16 +18,24 @@ NAMES: dict[Firmware, tuple[str, ...]] = {
     "ardupilot": (
         *("RTL_ALT", "RTL_ALT_M", "RTL_CLIMB_MIN", "RTL_CLIMB_MIN_M", "RTL_CONE_SLOPE"),
         *("RTL_SPEED", "RTL_SPEED_MS", "WPNAV_SPEED", "WP_SPD", "PSC_JERK_XY", "PSC_JERK_NE"),
+        *("WPNAV_SPEED_UP", "WP_SPD_UP", "WPNAV_SPEED_DN", "WP_SPD_DN", "RTL_LOIT_TIME"),
+        *("LAND_SPEED", "LAND_SPD_MS", "LAND_SPEED_HIGH", "LAND_SPD_HIGH_MS", "LAND_ALT_LOW", "LAND_ALT_LOW_M"),
         *("FENCE_ENABLE", "FENCE_TYPE", "FENCE_ACTION", "FENCE_ALT_MAX"),
     ),
-    "px4": ("RTL_RETURN_ALT", "RTL_CONE_ANG", "RTL_MIN_DIST", "GF_ACTION"),
+    "px4": (
+        *("RTL_RETURN_ALT", "RTL_CONE_ANG", "RTL_MIN_DIST", "RTL_LAND_DELAY", "GF_ACTION"),
+        *("MPC_XY_CRUISE", "MPC_Z_V_AUTO_UP", "MPC_Z_V_AUTO_DN", "MPC_LAND_SPEED", "MPC_LAND_ALT1"),
+    ),
 }
 """What to read before a start. ArduPilot 4.7 counts in metres what earlier versions count in centimetres."""
 NEAR_HALF_DEG = 45.0
 """Of PX4's cone, from the vertical: the larger, the lower it flies close to home; 0 switches the cone off."""
 CRUISE, HOME, JERK = ("WP_SPD", "WPNAV_SPEED"), ("RTL_SPEED_MS", "RTL_SPEED"), ("PSC_JERK_NE", "PSC_JERK_XY")
 """ArduPilot's names, those of 4.7 and newer first."""
-IN_CM = frozenset({"WPNAV_SPEED", "RTL_SPEED"})
+UP, DOWN = ("WP_SPD_UP", "WPNAV_SPEED_UP"), ("WP_SPD_DN", "WPNAV_SPEED_DN")
+LAND, LAND_FAST = ("LAND_SPD_MS", "LAND_SPEED"), ("LAND_SPD_HIGH_MS", "LAND_SPEED_HIGH")
+LAND_LOW = ("LAND_ALT_LOW_M", "LAND_ALT_LOW")
+IN_CM = frozenset(names[1] for names in (CRUISE, HOME, UP, DOWN, LAND, LAND_FAST, LAND_LOW))
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +96,31 @@ def flown_speeds(parameters: Mapping[str, float | None], onboard: OnboardMission
     name, home_m_s = _first(parameters, HOME)
     _, jerk = _first(parameters, JERK)
     return Speeds(_mission_m_s(onboard, cruise_m_s), home_m_s or cruise_m_s, name, jerk or None)
+
+
+def return_speeds(parameters: Mapping[str, float | None], firmware: Firmware) -> ReturnSpeeds:
+    """As the vehicle is set. PX4's delay before it lands counts where it is one: below 0 it never lands by itself."""
+    if firmware == "px4":
+        cruise_m_s, up_m_s, down_m_s, land_m_s, low_m, wait_s = (
+            _first(parameters, (name,))[1]
+            for name in (
+                *("MPC_XY_CRUISE", "MPC_Z_V_AUTO_UP", "MPC_Z_V_AUTO_DN"),
+                *("MPC_LAND_SPEED", "MPC_LAND_ALT1", "RTL_LAND_DELAY"),
+            )
+        )
+        wait_s = None if wait_s is None else max(0.0, wait_s)
+        return ReturnSpeeds(cruise_m_s, up_m_s, down_m_s, land_m_s, low_m, wait_s)
+    level_m_s, up_m_s, down_m_s, land_m_s, fast_m_s, low_m, wait_ms = (
+        _first(parameters, names)[1] for names in (HOME, UP, DOWN, LAND, LAND_FAST, LAND_LOW, ("RTL_LOIT_TIME",))
+    )
+    return ReturnSpeeds(
+        level_m_s or _first(parameters, CRUISE)[1],
+        up_m_s,
+        fast_m_s or down_m_s,
+        land_m_s,
+        low_m,
+        None if wait_ms is None else wait_ms / 1000,
+    )
 
 
 def _first(parameters: Mapping[str, float | None], names: tuple[str, ...]) -> tuple[str, float | None]:

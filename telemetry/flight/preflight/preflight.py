@@ -16,6 +16,7 @@ from planning.certificate.home_stand import ground_at
 from planning.errors import MissionError
 from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint
 from planning.flight_time.predict import predict_duration
+from planning.flight_time.return_speeds import ReturnSpeeds
 from planning.formats.commands import has_position
 from planning.missions.flown import AMSL_FRAMES, flown_line
 from planning.terrain.dsm import Dsm
@@ -24,7 +25,7 @@ from planning.terrain.vertical_datum import is_amsl
 from telemetry.flight.preflight import checks
 from telemetry.flight.preflight.checks import Row
 from telemetry.flight.preflight.fence_check import fence_row, flown_within
-from telemetry.flight.preflight.parameters import return_settings
+from telemetry.flight.preflight.parameters import return_settings, return_speeds
 from telemetry.mavlink.items import mission_from_onboard
 from telemetry.topics.onboard_lists import OnboardMission, PlacesOnboard
 from telemetry.topics.vehicle import VehicleState
@@ -141,7 +142,9 @@ def check(
         _home_row(home, planned_home, state, dsm, shift_m, mission, needs, rereferenced_m, certificate),
         checks.gnss_row(state, profile),
         checks.return_row(certificate, settings, clearance),
-        checks.battery_row(state, profile, _predicted_s(mission, profile, surface)),
+        checks.battery_row(
+            state, profile, _predicted_s(mission, profile, surface, return_speeds(parameters, firmware))
+        ),
         checks.ready_row(state),
         *([] if row is None else [row]),
     )
@@ -207,11 +210,13 @@ def _certificate(
         return None, f"{error.what} {error.advice}".strip()
 
 
-def _predicted_s(mission: Mission | None, profile: VehicleProfile, surface: Dsm | None) -> float | None:
+def _predicted_s(
+    mission: Mission | None, profile: VehicleProfile, surface: Dsm | None, returns: ReturnSpeeds
+) -> float | None:
     if mission is None or surface is None:
         return None
     try:
-        return predict_duration(mission, profile, surface).total_s
+        return predict_duration(mission, profile, surface, returns=returns).total_s
     except MissionError:
         return None
 
