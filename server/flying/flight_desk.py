@@ -176,7 +176,7 @@ class FlightDesk:
             try:
                 await taking.hold(operator)
                 self._set_busy("Finding the way into the plan")
-                asked, made = await taking.made(operator, body)
+                asked, made = await taking.made(operator, body, self._set_busy)
                 self._set_busy("Uploading")
                 await self._put_on_board(operator, asked, made)
             except DescribedError as error:

@@ -279,6 +279,23 @@ def test_a_battery_that_is_not_told_can_be_accepted(
     runner.run(scenario())
 
 
+def test_one_that_is_computed_for_too_long_is_given_up_and_the_next_one_is_made(
+    made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scenario() -> None:
+        bench = await flown(made, tmp_path, lanes)
+        with monkeypatch.context() as hurried:
+            hurried.setattr("server.flying.in_flight.take_up_desk.FOUND_WITHIN_S", 0.0)
+            with pytest.raises(NotReadyError, match="No way into the plan was found within 0 s") as refused:
+                await bench.desk.take_up(ME, TakeUpPlan(revision=3))
+        assert HOLDS in refused.value.advice
+        assert bench.desk.state.busy == ""
+        assert (await bench.desk.take_up(ME, TakeUpPlan(revision=3))).taken_up is not None
+        assert "Finding the way into the plan" in {state.busy for state in bench.told}
+
+    runner.run(scenario())
+
+
 @pytest.mark.parametrize(
     ("over_ground_m", "words"), [(5.0, "5.0 m above the ground"), (-3.0, "3.0 m below the ground")]
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
 
@@ -40,6 +41,8 @@ E = TypeVar("E", bound=DescribedError)
 HOLDS_WITHIN_S, LOOK_EVERY_S, STILL_S = 30.0, 0.1, 1.0
 """So long it must be still, at a stretch, before its place is taken for the beginning."""
 RETRY = "Try again, return home, or land."
+FOUND_WITHIN_S = 60.0
+"""Longer nobody lets a vehicle hover for an answer; it can be told to return or land all the while."""
 FIRMWARES = {"ardupilot": "ArduPilot", "px4": "PX4"}
 
 
@@ -104,8 +107,10 @@ class TakingUp:
             await asyncio.sleep(LOOK_EVERY_S)
             still_s = still_s + LOOK_EVERY_S if _holds(self._state()) else 0.0
 
-    async def made(self, operator: Operator, body: TakeUpPlan) -> tuple[AskedTakeUp, MadeTakeUp]:
-        """Nothing is sent."""
+    async def made(
+        self, operator: Operator, body: TakeUpPlan, tell: Callable[[str], None]
+    ) -> tuple[AskedTakeUp, MadeTakeUp]:
+        """Nothing is sent. ``tell``: what is being done."""
         plan = self._workspace.state
         check_uploadable(plan, body.revision)
         assert self._before is not None
@@ -135,7 +140,12 @@ class TakingUp:
             home_of_takeoff(self._live.track.states),
         )
         asked = replace(asked, state=self._state(), now_mono_s=time.monotonic())
-        made = await self._workspace.plan_lane.call(make_take_up, asked)
+        try:
+            async with asyncio.timeout(FOUND_WITHIN_S):
+                made = await self._workspace.plan_lane.call(make_take_up, asked, progress=lambda step, _: tell(step))
+        except TimeoutError:
+            what = f"No way into the plan was found within {FOUND_WITHIN_S:.0f} s."
+            raise NotReadyError(what, advice="Plan fewer points, or a smaller position error.") from None
         battery = made.doc.battery
         if battery.state != "good" and (battery.state != "accept" or "battery" not in body.accept):
             raise NotAllowedError(battery.text, where="battery", advice=battery.mend)
