@@ -24,7 +24,7 @@ from server.cli.shared.own_nodes import OPERATOR, own_nodes
 from server.cli.shared.upload_words import report_lines, report_summary
 from telemetry.flight.preflight.prepare import connect
 from telemetry.flight.watch import watching
-from telemetry.mavlink.address import parse_address
+from telemetry.mavlink.address import parse_addresses
 from telemetry.mavlink.items import mission_items, wire_items
 from telemetry.topics.onboard_lists import Item, PlaceList, UploadReport
 from telemetry.topics.requests import DownloadPlaces, UploadPlaces
@@ -32,7 +32,10 @@ from telemetry.topics.requests import DownloadPlaces, UploadPlaces
 Action = Literal["upload", "download", "clear"]
 Places = tuple[Fence, tuple[RallyPoint, ...]]
 LinkArgument = Annotated[
-    str, Argument(metavar="LINK", help="Connection to the vehicle: udpin:0.0.0.0:14550, tcp:10.0.0.7:5760.")
+    str,
+    Argument(
+        metavar="LINK", help="Connection to the vehicle: udpin:0.0.0.0:14550, tcp:10.0.0.7:5760; several with commas."
+    ),
 ]
 ActionArgument = Annotated[
     Action, Argument(metavar="upload|download|clear", help="Send a file, save what is on board, or remove it.")
@@ -79,7 +82,7 @@ def rally(
 def _run(
     kind: PlaceList, link: str, action: Action, file: Path | None, data_dir: Path | None, *, as_json: bool
 ) -> None:
-    parse_address(link)
+    parse_addresses(link)
     job = _Job(kind, link, data_dir)
     if action == "download":
         _save(job, _target(file, action), as_json=as_json)

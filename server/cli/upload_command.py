@@ -18,7 +18,7 @@ from server.cli.shared.own_nodes import OPERATOR, own_nodes
 from server.cli.shared.upload_words import report_lines, report_summary
 from telemetry.flight.preflight.prepare import connect, transfer
 from telemetry.flight.watch import watching
-from telemetry.mavlink.address import parse_address
+from telemetry.mavlink.address import parse_addresses
 from telemetry.topics.onboard_lists import UploadReport
 
 
@@ -26,7 +26,7 @@ from telemetry.topics.onboard_lists import UploadReport
 def upload(mission: o.MissionFile, *, link: o.Link, data_dir: o.Keys = None, as_json: o.AsJson = False) -> None:
     """Replace the mission on board, read it back, and say what the vehicle rounded."""
     flight = read_mission(mission.name, read_small(mission))
-    parse_address(link)
+    parse_addresses(link)
     say_notes(*flight.warnings, fence_stays(flight))
     report = asyncio.run(_upload(flight, link, data_dir))
     answer(report_summary(report), report_lines(report), as_json=as_json)

@@ -73,6 +73,16 @@ def parse_address(text: str) -> Address:
     return _network(wanted, kind)
 
 
+def parse_addresses(text: str) -> tuple[Address, ...]:
+    """Of several ways to one vehicle, with commas between. Raises AddressError, also for one that is named twice."""
+    found = tuple(parse_address(part) for part in text.split(",") if part.strip())
+    if not found:
+        raise AddressError("No connection is named.", advice=EXAMPLES)
+    if len({each.text for each in found}) < len(found):
+        raise AddressError(f"{_shown(text)} names a connection twice.", advice="Name each way to the vehicle once.")
+    return found
+
+
 def _network(text: str, kind: Kind) -> Address:
     parts = _NETWORK.fullmatch(text)
     place = _HOST_PORT.fullmatch(parts["rest"]) if parts else None

@@ -183,6 +183,15 @@ def test_nobody_is_heard() -> None:
         flown(pilot, replace(OPTIONS, connect_s=0.1))
 
 
+def test_several_ways_are_opened_to_the_same_vehicle() -> None:
+    pilot = Pilot(SmallBus())
+    flown(pilot, replace(OPTIONS, address=f"udpin:0.0.0.0:14550,{ADDRESS}"))
+    assert [(each.address, each.adopt, each.as_way) for each in pilot.of(Connect)] == [
+        ("udpin:0.0.0.0:14550", True, True),
+        (ADDRESS, True, True),
+    ]
+
+
 def test_a_connection_that_cannot_be_opened(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("telemetry.flight.preflight.prepare.FAILED_PATIENCE_S", 0.0)
     pilot = Pilot(SmallBus())

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from telemetry.errors import AddressError
-from telemetry.mavlink.address import Address, parse_address, refuse_file
+from telemetry.mavlink.address import Address, parse_address, parse_addresses, refuse_file
 
 
 @pytest.mark.parametrize(
@@ -93,3 +93,17 @@ def test_a_file_in_the_place_of_a_device_is_not_opened(tmp_path: Path) -> None:
     with pytest.raises(AddressError, match="a file or folder"):
         refuse_file(file, str(file))
     refuse_file(Path("/dev/null"), "a character device")
+
+
+def test_several_ways_stand_with_commas_between_and_each_once() -> None:
+    found = parse_addresses("udpin:0.0.0.0:14550, /dev/ttyUSB0:57600")
+    assert [each.text for each in found] == ["udpin:0.0.0.0:14550", "/dev/ttyUSB0:57600"]
+    assert parse_addresses("tcp:10.0.0.7:5760") == (parse_address("tcp:10.0.0.7:5760"),)
+    for wrong, words in (
+        ("", "No connection"),
+        (" , ", "No connection"),
+        ("tcp:a:1,tcp:a:1", "twice"),
+        ("tcp:a:1,x", "x"),
+    ):
+        with pytest.raises(AddressError, match=words):
+            parse_addresses(wrong)

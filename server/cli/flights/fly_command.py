@@ -42,7 +42,7 @@ from server.work.clocks import StepTimer
 from telemetry.errors import TelemetryError
 from telemetry.flight.fly import FlyOptions, FlyResult
 from telemetry.flight.fly import fly as conduct
-from telemetry.mavlink.address import parse_address
+from telemetry.mavlink.address import parse_addresses
 from telemetry.recording.flight_log import read_flight_log
 from telemetry.topics.recording_requests import StartRecording, StopRecording
 
@@ -88,7 +88,7 @@ def fly(
     Without --dsm neither the ground at home nor the clearance is checked.
     """
     flight = read_mission(mission.name, read_small(mission))
-    parse_address(link)
+    parse_addresses(link)
     if record is not None:
         check_new(record)
     points = check_checklist(checklist, checklist_done_by)

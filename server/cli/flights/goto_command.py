@@ -33,7 +33,7 @@ from telemetry.flight.certified_way import Flown, judged_way, nearest_rally, par
 from telemetry.flight.preflight.parameters import NAMES
 from telemetry.flight.preflight.prepare import connect
 from telemetry.flight.watch import Watch, watching
-from telemetry.mavlink.address import parse_address
+from telemetry.mavlink.address import parse_addresses
 from telemetry.mavlink.items import mission_items
 from telemetry.topics.messages import FlightStatus
 from telemetry.topics.requests import DownloadPlaces, Pause, ReadParameters
@@ -60,7 +60,11 @@ class GotoOptions:
 @command
 def goto(
     link: Annotated[
-        str, Argument(metavar="LINK", help="Connection to the vehicle: udpin:0.0.0.0:14550, tcp:10.0.0.7:5760.")
+        str,
+        Argument(
+            metavar="LINK",
+            help="Connection to the vehicle: udpin:0.0.0.0:14550, tcp:10.0.0.7:5760; several with commas.",
+        ),
     ],
     action: Annotated[
         Action,
@@ -87,7 +91,7 @@ def goto(
 
     It is raised as far as it must be, or refused with where and by how much. What sensors see is not known here.
     """
-    parse_address(link)
+    parse_addresses(link)
     wish = _wish(action, _place(action, place), wanted)
     vehicle = replace(load_profile(given.profile), **o.of_vehicle(given, demands))
     request = PlanRequest(

@@ -25,7 +25,7 @@ from telemetry.bus.log_download import log_stretches
 from telemetry.errors import NoVehicleError, TelemetryError
 from telemetry.flight.preflight.prepare import connect
 from telemetry.flight.watch import watching
-from telemetry.mavlink.address import parse_address
+from telemetry.mavlink.address import parse_addresses
 from telemetry.topics.requests import ListVehicleLogs
 from telemetry.topics.vehicle import VehicleState
 from telemetry.topics.vehicle_logs import VehicleLog
@@ -36,7 +36,7 @@ ENDINGS = {"ardupilot": ".bin", "px4": ".ulg"}
 @command
 def list_(*, link: o.Link, data_dir: o.Keys = None, as_json: o.AsJson = False) -> None:
     """Say which logs lie on the vehicle, the newest first; refused while it is armed."""
-    parse_address(link)
+    parse_addresses(link)
     logs = asyncio.run(_list(link, data_dir))
     lines = [f"{log.number:5d}  {_begun(log):20s}  {log.size_bytes / 1e6:9.2f} MB" for log in logs]
     answer({"logs": [_json(log) for log in logs]}, lines or ["There is no log on the vehicle."], as_json=as_json)
@@ -52,7 +52,7 @@ def get(
     as_json: o.AsJson = False,
 ) -> None:
     """Read a log from the vehicle into a file; refused while it is armed."""
-    parse_address(link)
+    parse_addresses(link)
     if number != "newest" and not (number.isascii() and number.isdigit() and len(number) < 6):
         raise ParameterError(f"{number!r} is no number of a log.", advice="Give a number, or newest.")
     check_directory(out)

@@ -31,7 +31,7 @@ from server.cli.shared.files_in_out import check_directory, read_small, write_fi
 from server.cli.shared.output import answer, say, say_notes
 from server.errors import StorageError
 from telemetry.errors import TelemetryError
-from telemetry.mavlink.address import parse_address
+from telemetry.mavlink.address import parse_addresses
 from telemetry.parameters.comparing import compare as compared
 from telemetry.parameters.comparing import of_vehicle
 from telemetry.parameters.files import (
@@ -75,7 +75,7 @@ def get(
     as_json: o.AsJson = False,
 ) -> None:
     """Say what the vehicle's parameters are; all of them without a name."""
-    parse_address(link)
+    parse_addresses(link)
     wanted = [name.upper() for name in names or ()]
     title, parameters, described = asyncio.run(_read(link, data_dir, about, wanted, whole=bool(search) or changed))
     if changed and not any(known.default is not None for known in (*parameters, *described.values())):
@@ -135,7 +135,7 @@ def set_(
     as_json: o.AsJson = False,
 ) -> None:
     """Write parameters, each read back before the next; refused while the vehicle is armed."""
-    parse_address(link)
+    parse_addresses(link)
     changes = _changes(pairs)
     written, described = asyncio.run(_set(link, data_dir, about, changes, even_armed))
     _tell(written, described, as_json=as_json)
@@ -182,7 +182,7 @@ def save(
     as_json: o.AsJson = False,
 ) -> None:
     """Write all parameters of the vehicle into a file."""
-    parse_address(link)
+    parse_addresses(link)
     if file.suffix.lower() not in (".param", ".parm", ".params"):
         advice = "Name it .param or .parm for Mission Planner and MAVProxy, .params for QGroundControl."
         raise FormatError("The file's name says no format.", where=str(file), advice=advice)
@@ -225,7 +225,7 @@ def load(
 
     See first with compare what that is.
     """
-    parse_address(link)
+    parse_addresses(link)
     given = _file(file)
     _note_own(given.parameters)
     chosen = _chosen(given.parameters, only, leave_out)
@@ -307,7 +307,7 @@ def compare(
     as_json: o.AsJson = False,
 ) -> None:
     """Say how the vehicle differs from a file or from another vehicle; ends with 1 if it does."""
-    parse_address(link)
+    parse_addresses(link)
     other = str(file)
     given: Sequence[FileParameter] | None = None
     if file.is_file() or not _is_link(other):

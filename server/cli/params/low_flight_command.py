@@ -27,7 +27,7 @@ from telemetry.errors import NotAllowedError
 from telemetry.flight.low_flight.findings import Finding
 from telemetry.flight.low_flight.low_plan import LowPlan, low_plan
 from telemetry.flight.low_flight.review import MULTIROTORS, review_settings
-from telemetry.mavlink.address import parse_address
+from telemetry.mavlink.address import parse_addresses
 from telemetry.parameters.files import value_text
 
 _WORDS = {"bad": "CHANGE", "look": "LOOK", "good": "good"}
@@ -51,7 +51,7 @@ def review(
 
     Nothing is written. With --dsm the return height is held against the surface model.
     """
-    parse_address(link)
+    parse_addresses(link)
     if dsm is not None and mission is None:
         raise ParameterError("A surface model says nothing without a mission.", where="--dsm", advice="Give a mission.")
     plan = None if mission is None else _plan(mission, dsm, given, demands, how)

@@ -27,7 +27,9 @@ MissionFile = Annotated[Path, Argument(metavar="MISSION", help="Mission: .waypoi
 Link = Annotated[
     str,
     Option(
-        metavar="URL", help="Connection to the vehicle: udpin:0.0.0.0:14550, tcp:10.0.0.7:5760, /dev/ttyACM0:57600."
+        metavar="URL[,URL]",
+        help="Connection to the vehicle: udpin:0.0.0.0:14550, tcp:10.0.0.7:5760, /dev/ttyACM0:57600; several ways to"
+        " the same vehicle with commas between.",
     ),
 ]
 Keys = Annotated[

@@ -19,7 +19,7 @@ from telemetry.flight.preflight.preflight import Preflight, actual_home, check
 from telemetry.flight.preflight.rereference import rereference
 from telemetry.flight.preflight.resume import Resumption, plan_resumption
 from telemetry.flight.watch import Asks, Watch
-from telemetry.mavlink.address import parse_address
+from telemetry.mavlink.address import parse_addresses
 from telemetry.mavlink.items import items_from_mission
 from telemetry.topics.checklist import ChecklistPoint
 from telemetry.topics.messages import ErrorInfo
@@ -72,23 +72,25 @@ class Prepared:
 async def connect(
     client: Asks, watch: Watch, address: str, operator: Operator, report: Report, *, timeout_s: float = CONNECT_S
 ) -> VehicleState:
-    """Opens the connection and adopts the first vehicle heard on it.
+    """Opens the connection and adopts the first vehicle heard on it. ``address``: several ways, with commas between.
 
-    Raises ConnectionFailedError when it cannot be opened, NoVehicleError when nobody is heard.
+    Raises ConnectionFailedError when none can be opened, NoVehicleError when nobody is heard.
     """
     report(f"Connecting to {address}")
-    text = parse_address(address).text
-    await client.call(Connect(operator, address, adopt=True))
+    texts = [each.text for each in parse_addresses(address)]
+    for text in texts:
+        await client.call(Connect(operator, text, adopt=True, as_way=len(texts) > 1))
     give_up_s = asyncio.get_running_loop().time() + FAILED_PATIENCE_S
 
     def found(seen: Watch) -> VehicleState | ErrorInfo | None:
         if seen.link is None:
             return None
         adopted = seen.link.adopted
-        if adopted is not None and adopted.address == text and seen.link.state == "live" and seen.vehicle is not None:
+        if adopted is not None and adopted.address in texts and seen.link.state == "live" and seen.vehicle is not None:
             return seen.vehicle
         hopeless = asyncio.get_running_loop().time() >= give_up_s
-        return next((c.error for c in seen.link.connections if hopeless and c.state == "failed"), None)
+        failed = [c.error for c in seen.link.connections if c.state == "failed"]
+        return failed[0] if hopeless and len(failed) == len(texts) else None
 
     answer = await watch.until(found, timeout_s=timeout_s)
     if isinstance(answer, ErrorInfo):
@@ -99,8 +101,10 @@ async def connect(
         raise NoVehicleError(what, where=address, advice=advice)
     told = await watch.until(lambda seen: _with_version(seen.vehicle, answer), timeout_s=VERSION_S) or answer
     report(f"Vehicle {told.system_id}: {told.autopilot} {told.firmware_version or ''}".rstrip())
-    for warning in () if watch.link is None else watch.link.warnings:
-        report(f"Warning: {warning}")
+    if watch.link is not None:
+        failed = [(c.address, c.error.what) for c in watch.link.connections if c.error is not None]
+        for warning in (*watch.link.warnings, *(f"The way {at} is not open: {what}" for at, what in failed)):
+            report(f"Warning: {warning}")
     return told
 
 
