@@ -24,7 +24,7 @@ _STEPS = {"bounds": "Looking for the bounds", "sort": "Sorting the points"}
 
 @command
 def cloud(
-    file: Annotated[Path, Argument(metavar="CLOUD", help="Point cloud: LAS, LAZ, PLY or PCD.")],
+    file: Annotated[Path, Argument(metavar="CLOUD", help="Point cloud: LAS, LAZ, COPC, PLY, PCD or E57.")],
     *,
     out: Annotated[Path, Option(metavar="FILE", help="The surface model: .tif. The ground goes to -ground.tif.")],
     cell_m: Annotated[

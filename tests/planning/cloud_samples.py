@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import laspy
+import lazrs
 import numpy as np
+import pye57
 from pyproj import CRS
 
 from mapping.geometry.arrays import F64, U8
@@ -49,6 +52,50 @@ def write_las(
     if withheld is not None:
         cloud.withheld = withheld
     cloud.write(str(path))
+    return path
+
+
+def write_copc(path: Path, xyz: F64, classes: U8) -> Path:
+    """As Cloud Optimized Point Clouds are for whoever knows LAZ alone: parts of different lengths, in no order."""
+    header = laspy.LasHeader(point_format=6, version="1.4")
+    header.scales, header.offsets = np.full(3, 0.001), CORNER
+    header.add_crs(CRS.from_user_input(UTM_EGM96))
+    plain = laspy.LasData(header)
+    plain.x, plain.y, plain.z = xyz.T
+    plain.classification = classes
+    plain.write(str(path.with_suffix(".las")))
+    vlr = lazrs.LazVlr.new_for_compression(6, 0, True)
+    with laspy.open(path.with_suffix(".las")) as file:
+        rows, header = file.read(), file.header
+    header.vlrs.append(laspy.VLR("copc", 1, "COPC info", bytes(160)))
+    header.vlrs.append(laspy.VLR("laszip encoded", 22204, "", vlr.record_data()))
+    raw = rows.points.array.tobytes()
+    size = len(raw) // len(xyz)
+    with path.open("w+b") as out:
+        header.are_points_compressed = True
+        header.update(rows.points)
+        header.write_to(out)
+        compressor = lazrs.LasZipCompressor(out, vlr)
+        for first, end in pairwise((0, len(xyz) // 7, len(xyz) // 2, len(xyz))):
+            compressor.compress_many(raw[first * size : end * size])
+            if end < len(xyz):
+                compressor.finish_current_chunk()
+        compressor.done()
+    return path
+
+
+def write_e57(
+    path: Path, scans: list[F64], *, poses: list[tuple[F64, F64]] | None = None, invalid: U8 | None = None
+) -> Path:
+    """``poses``: (4,) w, x, y, z and (3,) metres of each scan; ``invalid``: of each scan's points."""
+    file = pye57.E57(str(path), mode="w")
+    for number, xyz in enumerate(scans):
+        data = {f"cartesian{axis}": np.ascontiguousarray(column) for axis, column in zip("XYZ", xyz.T, strict=True)}
+        if invalid is not None:
+            data["cartesianInvalidState"] = invalid.astype(np.int8)
+        q_wxyz, t_m = poses[number] if poses else (np.array([1.0, 0, 0, 0]), np.zeros(3))
+        file.write_scan_raw(data, rotation=q_wxyz, translation=t_m)
+    file.close()
     return path
 
 

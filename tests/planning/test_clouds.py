@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 import sys
 from collections.abc import Callable
@@ -21,6 +22,7 @@ from planning.errors import (
     RasterFormatError,
     RasterTooLargeError,
 )
+from planning.terrain.clouds.canopy import canopy_of, shares_of
 from planning.terrain.clouds.grid import Sorter, cell_for, grid_for, rounded_up
 from planning.terrain.clouds.read import LIMITS, CloudParams, read_cloud
 from planning.terrain.dsm import Dsm
@@ -30,6 +32,8 @@ from tests.planning.cloud_samples import (
     UTM_EGM96,
     highest_slowly,
     some_points,
+    write_copc,
+    write_e57,
     write_las,
     write_pcd,
     write_ply,
@@ -66,6 +70,56 @@ def test_las_and_laz(tmp_path: Path, name: str, point_format: int) -> None:
     assert (made.points, made.taken, made.noise) == (len(xyz), int((~noise).sum()), int(noise.sum()))
     assert made.dsm.crs.to_epsg() == 32633
     assert "noise were left out" in " ".join(made.notes)
+
+
+def test_copc_is_a_laz_with_parts_of_any_length(tmp_path: Path) -> None:
+    xyz, classes = some_points(14)
+    made = read_cloud(write_copc(tmp_path / "a.copc.laz", xyz, classes), CloudParams(CELL_M))
+    held_against(made.dsm, xyz[~np.isin(classes, NOISE)])
+    assert made.points == len(xyz)
+
+
+def test_e57_scans_are_placed_by_their_poses_and_invalid_points_left_out(tmp_path: Path) -> None:
+    xyz, _ = some_points(15, 1000)
+    local = xyz - CORNER
+    turn = np.array([math.cos(0.3), 0.0, 0.0, math.sin(0.3)])
+    invalid = np.zeros(len(xyz), np.uint8)
+    invalid[::5] = 2
+    poses = [(np.array([1.0, 0, 0, 0]), CORNER), (turn, CORNER + 20.0)]
+    path = write_e57(tmp_path / "a.e57", [local, local], poses=poses, invalid=invalid)
+    made = read_cloud(path, DECLARED)
+    cosine, sine = math.cos(0.6), math.sin(0.6)
+    turned = local @ np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1.0]]) + CORNER + 20.0
+    held_against(made.dsm, np.vstack([each[invalid == 0] for each in (xyz, turned)]))
+    assert (made.points, made.not_numbers) == (2 * len(xyz), 2 * int((invalid > 0).sum()))
+    assert made.ground is None
+
+
+def test_what_is_of_which_class_and_how_high_it_stands(tmp_path: Path) -> None:
+    xyz, classes = some_points(16)
+    made = read_cloud(write_las(tmp_path / "a.laz", xyz, classes), CloudParams(CELL_M))
+    counted = np.bincount(classes[~np.isin(classes, NOISE)], minlength=256)
+    assert list(made.classes) == counted.tolist()
+    shares = shares_of(made.classes)
+    assert list(shares) == ["ground", "vegetation", "buildings"]
+    assert sum(shares.values()) == pytest.approx(1.0)
+    assert made.ground is not None
+    tops = highest_slowly(xyz[~np.isin(classes, NOISE)], CELL_M)
+    above_m = [tops[place] - ground_m for place, ground_m in highest_slowly(xyz[classes == 2], CELL_M).items()]
+    canopy = canopy_of(made.dsm.elevation_m, made.ground.elevation_m)
+    assert canopy.cells == len(above_m)
+    assert canopy.greatest_m == pytest.approx(max(above_m), abs=1e-3)
+    tall = [height_m for height_m in above_m if height_m >= 2.0]
+    assert canopy.share == pytest.approx(len(tall) / len(above_m), abs=1e-3)
+    assert canopy.median_m == pytest.approx(float(np.median(tall)), abs=1e-2)
+
+
+def test_points_that_nobody_classified_have_no_shares() -> None:
+    counts = [0] * 256
+    assert shares_of(counts) == {}
+    counts[0], counts[1] = 5, 7
+    assert shares_of(counts) == {}
+    assert canopy_of(np.ones((2, 2), np.float32), np.full((2, 2), np.nan, np.float32)).cells == 0
 
 
 def test_datum_is_the_files_and_noise_can_be_kept(tmp_path: Path) -> None:
@@ -203,7 +257,12 @@ WRONG: list[tuple[str, Callable[[Path], Path], type[RasterError], str]] = [
     ("nothing", lambda folder: folder / "a.laz", RasterFormatError, "no such file"),
     ("empty", written("a.laz", b""), RasterFormatError, "empty file"),
     ("other", written("a.laz", b"hello world"), RasterFormatError, "no point cloud"),
-    ("e57", written("a.e57", b"ASTM-E57" + bytes(100)), RasterFormatError, "Export it as LAZ"),
+    ("e57 of a head", written("a.e57", b"ASTM-E57" + bytes(100)), RasterFormatError, "corrupt"),
+    ("e57 cut", lambda folder: cut(write_e57(folder / "a.e57", [some_points(10, 5000)[0]])),
+     RasterFormatError, "corrupt"),
+    ("e57 of no points", lambda folder: write_e57(folder / "a.e57", []), NoElevationError, "no points"),
+    ("e57 of no pose", lambda folder: write_e57(folder / "a.e57", [plain(folder)[1]], poses=[(np.zeros(4), CORNER)]),
+     RasterFormatError, "pose of its scan 1 is none"),
     ("tiff", written("a.tif", b"II*\0" + bytes(100)), RasterFormatError, "TIFF"),
     ("las of a head", written("a.las", b"LASF" + bytes(40)), RasterFormatError, "corrupt"),
     ("laz cut", lambda folder: cut(las(folder)), RasterFormatError, "a.laz"),
@@ -292,5 +351,5 @@ def test_flipped_bits_never_come_through_as_another_error(tmp_path: Path) -> Non
 
 
 def test_only_the_child_loads_what_decodes() -> None:
-    code = "import sys, server.cli.cloud_command; sys.exit('laspy' in sys.modules or 'lazrs' in sys.modules)"
+    code = "import sys, server.cli.cloud_command; sys.exit(bool({'laspy', 'lazrs', 'pye57'} & set(sys.modules)))"
     subprocess.run([sys.executable, "-c", code], check=True)

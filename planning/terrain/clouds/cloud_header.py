@@ -8,9 +8,8 @@ from typing import Any
 
 from planning.errors import RasterFormatError
 
-_FORMATS = {b"LASF": "las", b"ply\n": "ply", b"ply\r": "ply", b"# .PCD": "pcd", b"VERSION": "pcd"}
+_FORMATS = {b"LASF": "las", b"ply\n": "ply", b"ply\r": "ply", b"# .PCD": "pcd", b"VERSION": "pcd", b"ASTM-E57": "e57"}
 _OTHERS = {
-    b"ASTM-E57": ("This is an E57 file, which is not read here.", "Export it as LAZ."),
     b"II*\0": ("This is a TIFF.", "A surface model as GeoTIFF needs no conversion: plan on it as it is."),
     b"MM\0*": ("This is a TIFF.", "A surface model as GeoTIFF needs no conversion: plan on it as it is."),
     b"II+\0": ("This is a TIFF.", "A surface model as GeoTIFF needs no conversion: plan on it as it is."),
@@ -45,19 +44,31 @@ class CloudHeader:
 
 
 def cloud_format(path: Path) -> str:
-    """ "las" (LAZ too), "ply" or "pcd", by the first bytes; RasterFormatError for any other file."""
-    try:
-        if not path.is_file():
-            raise RasterFormatError("There is no such file.", where=str(path), advice="Check the path.")
-        with path.open("rb") as file:
-            head = file.read(64)
-    except OSError as error:
-        raise RasterFormatError(f"Cannot read the file: {error.strerror}.", where=str(path)) from error
-    for magic, name in _FORMATS.items():
-        if head.startswith(magic):
-            return name
+    """ "las" (LAZ and COPC too), "ply", "pcd" or "e57", by the first bytes; RasterFormatError for any other file."""
+    head = _head(path)
+    if name := _format(head):
+        return name
     for magic, (what, advice) in _OTHERS.items():
         if head.startswith(magic):
             raise RasterFormatError(what, where=path.name, advice=advice)
     what = "This is an empty file" if not head else "This is no point cloud that is known here"
-    raise RasterFormatError(f"{what}.", where=path.name, advice="Give a LAS, LAZ, PLY or PCD file.")
+    raise RasterFormatError(f"{what}.", where=path.name, advice="Give a LAS, LAZ, PLY, PCD or E57 file.")
+
+
+def is_cloud(path: Path) -> bool:
+    """By the first bytes. Raises RasterFormatError for a file that cannot be read."""
+    return _format(_head(path)) is not None
+
+
+def _format(head: bytes) -> str | None:
+    return next((name for magic, name in _FORMATS.items() if head.startswith(magic)), None)
+
+
+def _head(path: Path) -> bytes:
+    try:
+        if not path.is_file():
+            raise RasterFormatError("There is no such file.", where=str(path), advice="Check the path.")
+        with path.open("rb") as file:
+            return file.read(64)
+    except OSError as error:
+        raise RasterFormatError(f"Cannot read the file: {error.strerror}.", where=str(path)) from error

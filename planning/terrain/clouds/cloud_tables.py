@@ -11,8 +11,8 @@ import numpy as np
 
 from mapping.geometry.arrays import F64, U8
 from planning.errors import RasterFormatError
+from planning.terrain.clouds.cloud import CHUNK, Box, Chunk
 
-_CHUNK = 1_000_000
 _LONGEST_LINE, _MOST_LINES = 4096, 1000
 _PLY_TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1", "short": "i2", "int16": "i2", "ushort": "u2",
@@ -22,9 +22,6 @@ _PLY_TYPES = {
 _PLY_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _PCD_KINDS = {"F": "f", "I": "i", "U": "u"}
 _CLASSES = ("classification", "scalar_classification", "class")
-
-Chunk = tuple[F64, U8 | None]
-"""(N, 3) x, y, z in the file's units, and (N,) ASPRS classes where it has them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +37,10 @@ class Table:
     columns: tuple[int, ...]
     """Of x, y, z and, where there is one, the class: the numbers of a row of text, or the fields of a binary one."""
     notes: tuple[str, ...] = ()
+    bounds: Box | None = None
+    crs_wkt: str | None = None
+    unit: str | None = None
+    """Three things that no such file tells."""
 
     @property
     def classified(self) -> bool:
@@ -55,8 +56,8 @@ class Table:
         """RasterFormatError when there are fewer points than the header says."""
         with self.path.open("rb") as file:
             file.seek(self.start)
-            for first in range(0, self.rows, _CHUNK):
-                count = min(_CHUNK, self.rows - first)
+            for first in range(0, self.rows, CHUNK):
+                count = min(CHUNK, self.rows - first)
                 numbers = self._text(file, count) if self.text else self._binary(file, count)
                 if len(numbers) < count:
                     raise RasterFormatError(

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from mapping.geometry.arrays import F32, F64, U8
+from mapping.geometry.arrays import F32
 from planning.errors import NoElevationError, RasterError, RasterFormatError
+from planning.terrain.clouds.cloud import Box, Chunk, Cloud
 from planning.terrain.clouds.cloud_header import CloudHeader
-from planning.terrain.clouds.cloud_tables import Table, pcd_table, ply_table
-from planning.terrain.clouds.grid import Bounds, CloudGrid, Sorter, cell_for, grid_for
-
-if TYPE_CHECKING:
-    from planning.terrain.clouds.las import LasFile
+from planning.terrain.clouds.cloud_tables import pcd_table, ply_table
+from planning.terrain.clouds.grid import CloudGrid, Sorter, cell_for, grid_for
 
 Json = dict[str, Any]
 Send = Callable[..., None]
@@ -40,32 +38,35 @@ def read_cloud(job: Json, send: Send, ask: Ask) -> None:
     send(
         "done", west_m=grid.west_m, north_m=grid.north_m, cell_m=grid.cell_m, shape=grid.shape, taken=sorter.taken,
         ground=sorter.ground, noise=sorter.noise, not_numbers=sorter.not_numbers, step_m=_step_m(cloud, grid),
+        classes=sorter.classes.tolist(),
     )  # fmt: skip
 
 
 JOBS: dict[str, Callable[[Json, Send, Ask], None]] = {"read_cloud": read_cloud}
 
 
-def _opened(path: Path, kind: str) -> LasFile | Table:
+def _opened(path: Path, kind: str) -> Cloud:
+    # Each format's library is loaded for its own files alone.
     if kind == "las":
-        from planning.terrain.clouds.las import open_las  # tables need nothing of it
+        from planning.terrain.clouds.las import open_las
 
         return open_las(path)
+    if kind == "e57":
+        from planning.terrain.clouds.e57 import open_e57
+
+        return open_e57(path)
     return ply_table(path) if kind == "ply" else pcd_table(path)
 
 
-def _header(cloud: LasFile | Table) -> CloudHeader:
-    if isinstance(cloud, Table):
-        return CloudHeader(cloud.rows, None, None, None, classified=cloud.classified, notes=cloud.notes)
-    return CloudHeader(cloud.rows, cloud.crs_wkt, cloud.unit, None, classified=True)
+def _header(cloud: Cloud) -> CloudHeader:
+    return CloudHeader(cloud.rows, cloud.crs_wkt, cloud.unit, None, classified=cloud.classified, notes=cloud.notes)
 
 
-def _sorted(cloud: LasFile | Table, job: Json, order: Json, send: Send) -> Sorter:
+def _sorted(cloud: Cloud, job: Json, order: Json, send: Send) -> Sorter:
     bounds = _bounds(cloud, order, send)
     grid = grid_for(bounds, order["cell_m"] or cell_for(bounds, cloud.rows), max_px=order["max_px"])
-    classified = not isinstance(cloud, Table) or cloud.classified
     heights = _empty(job["target"], grid)
-    sorter = Sorter(grid, heights, _empty(job["ground"], grid) if classified else None, order["keep_noise"])
+    sorter = Sorter(grid, heights, _empty(job["ground"], grid) if cloud.classified else None, order["keep_noise"])
     done = 0
     for xyz_m, classes in _in_metres(cloud, order):
         sorter.add(xyz_m, classes)
@@ -85,9 +86,9 @@ def _sorted(cloud: LasFile | Table, job: Json, order: Json, send: Send) -> Sorte
     return sorter
 
 
-def _bounds(cloud: LasFile | Table, order: Json, send: Send) -> Bounds:
-    """As the header gives them; of files that give none, looked for."""
-    if not isinstance(cloud, Table):
+def _bounds(cloud: Cloud, order: Json, send: Send) -> Box:
+    """In metres, as the header gives them; of files that give none, looked for."""
+    if cloud.bounds is not None:
         west, south, east, north = (value * order["xy_m"] for value in cloud.bounds)
         return west, south, east, north
     least, most, done = np.full(2, np.inf), np.full(2, -np.inf), 0
@@ -102,7 +103,7 @@ def _bounds(cloud: LasFile | Table, order: Json, send: Send) -> Bounds:
     return float(least[0]), float(least[1]), float(most[0]), float(most[1])
 
 
-def _in_metres(cloud: LasFile | Table, order: Json) -> Iterator[tuple[F64, U8 | None]]:
+def _in_metres(cloud: Cloud, order: Json) -> Iterator[Chunk]:
     factors = np.array([order["xy_m"], order["xy_m"], order["z_m"]])
     for xyz, classes in cloud.chunks():
         yield xyz * factors, classes
@@ -114,9 +115,9 @@ def _empty(path: str, grid: CloudGrid) -> F32:
     return cells
 
 
-def _step_m(cloud: LasFile | Table, grid: CloudGrid) -> float:
+def _step_m(cloud: Cloud, grid: CloudGrid) -> float:
     """How far apart neighbouring coordinates lie where 32 bits keep them; 0 where they are kept finely."""
-    if not isinstance(cloud, Table) or not cloud.coarse:
+    if not cloud.coarse:
         return 0.0
     return float(np.spacing(np.float32(max(abs(grid.west_m), abs(grid.north_m)))))
 

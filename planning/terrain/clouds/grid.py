@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from mapping.geometry.arrays import F32, F64, U8
+from mapping.geometry.arrays import F32, F64, I64, U8
 from planning.errors import RasterFormatError, RasterTooLargeError
+from planning.terrain.clouds.cloud import Box
 
 GROUND = 2
 NOISE = (7, 18)
 _POINTS_PER_CELL = 4.0
 _SIZES_M = (0.05, 0.1, 0.2, 0.25, 0.5, 1.0, 2.0, 5.0)
-
-Bounds = tuple[float, float, float, float]
-"""Least x and y, greatest x and y."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,14 +27,14 @@ class CloudGrid:
     shape: tuple[int, int]
 
 
-def cell_for(bounds_m: Bounds, points: int) -> float:
+def cell_for(bounds_m: Box, points: int) -> float:
     """The size at which about four points fall into a cell of the box around all of them, rounded up."""
     west, south, east, north = bounds_m
     wanted_m = math.sqrt(_POINTS_PER_CELL * (east - west) * (north - south) / max(points, 1))
     return next((size_m for size_m in _SIZES_M if size_m >= wanted_m), _SIZES_M[-1])
 
 
-def grid_for(bounds_m: Bounds, cell_m: float, *, max_px: int) -> CloudGrid:
+def grid_for(bounds_m: Box, cell_m: float, *, max_px: int) -> CloudGrid:
     """RasterTooLargeError when it has more than ``max_px`` cells."""
     west, south, east, north = bounds_m
     if not (all(map(math.isfinite, bounds_m)) and west <= east and south <= north):
@@ -69,6 +67,8 @@ class Sorter:
     noise: int = 0
     not_numbers: int = 0
     outside: int = 0
+    classes: I64 = field(default_factory=lambda: np.zeros(256, np.int64))
+    """(256,) how many of the points that were taken are of each class."""
 
     def add(self, xyz_m: F64, classes: U8 | None) -> None:
         """(N, 3) projected x, y and height in metres, and (N,) ASPRS classes."""
@@ -89,6 +89,7 @@ class Sorter:
         heights_m = rounded_up(xyz_m[:, 2])
         np.maximum.at(self.highest_m.reshape(-1), cells, heights_m)
         if classes is not None and self.ground_m is not None:
+            self.classes += np.bincount(classes, minlength=256)
             ground = classes == GROUND
             self.ground += int(ground.sum())
             np.maximum.at(self.ground_m.reshape(-1), cells[ground], heights_m[ground])

@@ -12,13 +12,19 @@ from laspy.vlrs.known import GeoKeyDirectoryVlr
 from pyproj import CRS
 from pyproj.crs import CompoundCRS
 
-from mapping.geometry.arrays import F64, U8
 from planning.errors import RasterFormatError
+from planning.terrain.clouds.cloud import CHUNK, Box, Chunk
 
-_CHUNK = 1_000_000
 _VERTICAL_KEY, _VERTICAL_UNIT_KEY = 4096, 4099
 _UNITS = {9001: "m", 9002: "ft", 9003: "us-ft"}
 _CODES = range(1024, 32767)
+_NEEDED = (
+    laspy.DecompressionSelection.XY_RETURNS_CHANNEL
+    | laspy.DecompressionSelection.Z
+    | laspy.DecompressionSelection.CLASSIFICATION
+    | laspy.DecompressionSelection.FLAGS
+)
+"""The rest of newer point formats stays compressed: that is half of the time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,16 +33,18 @@ class LasFile:
 
     path: Path
     rows: int
-    bounds: tuple[float, float, float, float]
-    """Least x and y, greatest x and y."""
+    bounds: Box | None
     crs_wkt: str | None
     unit: str | None
+    classified: bool = True
+    coarse: bool = False
+    notes: tuple[str, ...] = ()
 
-    def chunks(self) -> Iterator[tuple[F64, U8 | None]]:
+    def chunks(self) -> Iterator[Chunk]:
         """(N, 3) x, y, z in the file's units, and (N,) classes; deleted ("withheld") points are left out."""
         read = 0
-        with laspy.open(self.path) as file:
-            for points in file.chunk_iterator(_CHUNK):
+        with laspy.open(self.path, decompression_selection=_NEEDED) as file:
+            for points in file.chunk_iterator(CHUNK):
                 read += len(points)
                 xyz = np.column_stack([np.asarray(axis) for axis in (points.x, points.y, points.z)])
                 classes = np.asarray(points.classification, dtype=np.uint8)

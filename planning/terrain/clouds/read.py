@@ -66,12 +66,14 @@ class CloudModel:
     ground_points: int
     noise: int
     not_numbers: int
+    classes: tuple[int, ...]
+    """(256,) points that were taken, by their class; all 0 where none has one."""
     notes: tuple[str, ...]
     """What was assumed or left out, in plain words."""
 
 
 def read_cloud(path: Path, params: CloudParams | None = None, *, progress: Progress | None = None) -> CloudModel:
-    """LAS, LAZ, PLY or PCD, decoded in a confined process. Raises a RasterError that says what to do."""
+    """LAS, LAZ, COPC, PLY, PCD or E57, decoded in a confined process. Raises a RasterError that says what to do."""
     params = params or CloudParams()
     headers: list[CloudHeader] = []
     places: list[georef.Georeference] = []
@@ -132,7 +134,7 @@ def _model(
 
     return CloudModel(
         dsm(heights), None if ground is None else dsm(ground), header.points, found["taken"], found["ground"],
-        found["noise"], found["not_numbers"], (*header.notes, *place.notes, *_left_out(found)),
+        found["noise"], found["not_numbers"], tuple(found["classes"]), (*header.notes, *place.notes, *_left_out(found)),
     )  # fmt: skip
 
 
