@@ -17,9 +17,24 @@ FREE, OCCUPIED, INNER = 1, 2, 3
 
 
 def write_bt(voxels: VoxelMap) -> bytes:
-    """All known voxels of a map; eight alike become one, as OctoMap prunes.
+    """All known voxels of a map as a file; eight alike become one, as OctoMap prunes.
 
     Raises CapacityError where the map is wider than OctoMap's 65,536 voxels.
+    """
+    nodes, body = tree_data(voxels)
+    header = f"id OcTree\nsize {nodes}\nres {voxels.resolution_m!r}\ndata\n"
+    return (
+        FIRST_LINE
+        + b"\n# (feel free to add / change comments, but leave the first line as it is!)\n"
+        + header.encode()
+        + body
+    )
+
+
+def tree_data(voxels: VoxelMap) -> tuple[int, bytes]:
+    """Number of nodes, and what follows a file's header; it is the ``data`` of ROS's octomap_msgs/Octomap as well.
+
+    Raises CapacityError as ``write_bt`` does.
     """
     keys, _, _ = voxels.known()
     occupied = voxels.occupied_keys()
@@ -29,14 +44,7 @@ def write_bt(voxels: VoxelMap) -> bytes:
             f"an OctoMap file ends at {HALF:,}.",
             advice="Export it as .ply, or take its origin nearer.",
         )
-    nodes, body = _tree_bytes(keys, occupied)
-    header = f"id OcTree\nsize {nodes}\nres {voxels.resolution_m!r}\ndata\n"
-    return (
-        FIRST_LINE
-        + b"\n# (feel free to add / change comments, but leave the first line as it is!)\n"
-        + header.encode()
-        + body
-    )
+    return _tree_bytes(keys, occupied)
 
 
 def _tree_bytes(keys: I32, occupied_keys: I32) -> tuple[int, bytes]:

@@ -27,7 +27,9 @@ router = APIRouter(prefix="/api/obstacles", tags=["obstacles"], responses=ERROR_
 
 MEDIA_TYPES: dict[MapFormat, str] = {
     "ply": "application/octet-stream",
+    "pcd": "application/octet-stream",
     "bt": "application/octet-stream",
+    "mcap": "application/octet-stream",
     "tif": "image/tiff",
     "geojson": "application/geo+json",
 }
@@ -92,7 +94,7 @@ async def targets(flying: Fly, source: Annotated[Source, Query()] = "live") -> R
 async def export_map(
     name: MapName, kind: MapFormat, flying: Fly, source: Annotated[Source, Query()] = "live"
 ) -> Response:
-    """A map as it is now: points, OctoMap, highest obstacle per cell, or clusters; 409 while it is empty.
+    """A map as it is now: points, OctoMap, its ROS 2 message, highest obstacle per cell, or clusters; 409 while empty.
 
     "vision_flight": of all that the camera has seen on its way.
     """

@@ -14,7 +14,7 @@ from server.schemas.strict_model import Asked, Strict
 from telemetry.topics.obstacles import AvoidanceStatus, MapName, ObstacleAlert, PerceptionSettings
 
 SensorName = Literal["radar", "vision", "ranges"]
-MapFormat = Literal["ply", "bt", "tif", "geojson"]
+MapFormat = Literal["ply", "pcd", "bt", "mcap", "tif", "geojson"]
 
 
 class AlertDoc(Strict):

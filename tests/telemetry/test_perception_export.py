@@ -5,15 +5,21 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from rosbags.highlevel import AnyReader
 
+from mapping.errors import ParameterError
 from mapping.geometry.frames import LocalFrame
+from mapping.voxels.pcd import pcd
+from planning.terrain.clouds.cloud_tables import pcd_table
 from planning.terrain.geotiff import read_dsm
-from telemetry.perception.rebuilding.export import ExportError, clusters, exported, outline
+from telemetry.perception.rebuilding.export import KINDS, ExportError, clusters, exported, outline
 from telemetry.topics.deltas import FoldedMap, in_parts
 from telemetry.topics.obstacles import MapDelta, MapOrigin
+from tests.reference.octomap import octree
 from tests.reference.octomap_bt import map_from_bt
 
 ORIGIN = MapOrigin(-37.1244507, 175.6892879, 803.0)
@@ -64,7 +70,41 @@ def test_point_cloud_and_octomap_hold_all_that_is_occupied() -> None:
     assert f"element vertex {len(MAST + WALL + GROUND)}".encode() in ply
 
 
-@pytest.mark.parametrize("kind", ["ply", "bt", "tif", "geojson"])
+def test_pcd_is_read_as_any_cloud_is(tmp_path: Path) -> None:
+    path = tmp_path / "map.pcd"
+    path.write_bytes(exported("pcd", folded(edge_m=0.5)))
+    (points, _), *more = pcd_table(path).chunks()
+    assert not more
+    assert {tuple(np.floor(point / 0.5).astype(int)) for point in points} == set(MAST + WALL + GROUND)
+    with pytest.raises(ParameterError, match="probability"):
+        pcd(np.zeros((2, 3)), probability=[0.5])
+
+
+def test_octomap_itself_reads_the_message_out_of_the_bag(tmp_path: Path) -> None:
+    """By rosbags' reader and OctoMap's own, which take nothing of what wrote it."""
+    path = tmp_path / "map.mcap"
+    path.write_bytes(exported("mcap", folded(edge_m=0.5)))
+    with AnyReader([path]) as reader:
+        ((connection, stamp_ns, raw),) = reader.messages()
+        message: Any = reader.deserialize(raw, connection.msgtype)
+    assert (connection.topic, connection.msgtype, stamp_ns) == (
+        "/octomap_binary",
+        "octomap_msgs/msg/Octomap",
+        2 * 10**9,
+    )
+    assert (message.header.frame_id, message.id, message.binary) == ("map", "OcTree", True)
+    tree = octree(message.resolution)
+    head, _, _ = exported("bt", folded(edge_m=0.5)).partition(b"data\n")
+    (tmp_path / "again.bt").write_bytes(head + b"data\n" + message.data.tobytes())
+    assert tree.readBinary(str(tmp_path / "again.bt"))
+    for east, north, up in (*MAST, *WALL, *GROUND):
+        found = tree.search((np.array([east, north, up]) + 0.5) * 0.5)
+        assert found is not None
+        assert tree.isNodeOccupied(found)
+    assert tree.search([3.0, 3.0, 3.0]) is None
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_an_empty_map_is_refused(kind: str) -> None:
     for empty in (FoldedMap(), folded(ground=False, obstacles=False)):
         with pytest.raises(ExportError, match="empty"):

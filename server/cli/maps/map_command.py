@@ -35,7 +35,9 @@ class MapFileError(DescribedError):
 def build_map(
     recording: Annotated[Path, Argument(metavar="RECORDING", help="A recording of Hedgehop (.mcap), or a bag of ROS.")],
     sensor: Annotated[Literal["radar", "vision", "ranges"], Option(help="Whose map.")],
-    out: Annotated[Path, Option(metavar="FILE", help="Ends with .ply, .bt, .tif or .geojson.")],
+    out: Annotated[
+        Path, Option(metavar="FILE", help="Ends with .ply, .pcd, .bt, .mcap (octomap_msgs), .tif or .geojson.")
+    ],
     resolution_m: Annotated[float | None, Option(metavar="M", help="Edge of a voxel; default: as in flight.")] = None,
     memory_mb: Annotated[
         float | None, Option(metavar="MB", help="The map's memory limit; default: as in flight.")
@@ -67,7 +69,7 @@ def build_map(
     kind: Kind | None = next((name for name in FORMATS if out.suffix.lower() == f".{name}"), None)
     if kind is None:
         what = f"{out.suffix or 'No ending'} is no format of maps."
-        raise MapFileError(what, where=out.name, advice="Choose .ply, .bt, .tif or .geojson.")
+        raise MapFileError(what, where=out.name, advice="Choose .ply, .pcd, .bt, .mcap, .tif or .geojson.")
     began_s = time.monotonic()
     other = OtherMap(
         resolution_m,

@@ -1,4 +1,4 @@
-"""A map as files for other programs: point cloud, OctoMap, GeoTIFF of the highest obstacles, GeoJSON of obstacles."""
+"""A map as files for other programs: points, OctoMap and its ROS message, GeoTIFF of the highest, GeoJSON of all."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from scipy.spatial import ConvexHull
 
 from mapping.geometry.arrays import F64, I32, I64
 from mapping.voxels.map import VoxelMap
-from mapping.voxels.octomap_bt import write_bt
+from mapping.voxels.octomap_bt import tree_data, write_bt
+from mapping.voxels.pcd import pcd
 from mapping.voxels.ply import ply
 from planning.terrain.dsm import Dsm
 from planning.terrain.geotiff import write_dsm
@@ -27,9 +28,11 @@ from telemetry.perception.mission_line import local_crs
 from telemetry.topics.deltas import FoldedMap, Voxels, packed_keys
 from telemetry.topics.obstacles import MapDelta
 
-Kind = Literal["ply", "bt", "tif", "geojson"]
-KINDS: tuple[Kind, ...] = ("ply", "bt", "tif", "geojson")
+Kind = Literal["ply", "pcd", "bt", "mcap", "tif", "geojson"]
+KINDS: tuple[Kind, ...] = ("ply", "pcd", "bt", "mcap", "tif", "geojson")
 
+OCTOMAP_TOPIC, MAP_FRAME = "/octomap_binary", "map"
+"""As octomap_server publishes it; REP 105."""
 MOST_CELLS = 100_000_000
 """Of a GeoTIFF: 400 MB before it is compressed."""
 _HALF_OF_26 = [d for d in product((-1, 0, 1), repeat=3) if d > (0, 0, 0)]
@@ -44,17 +47,19 @@ class ExportError(TelemetryError):
 def exported(kind: Kind, folded: FoldedMap) -> bytes:
     """The whole map as a file of that kind. Raises ExportError when there is nothing in it, or it does not fit.
 
-    ``ply`` and ``bt`` hold every occupied voxel, known ground too, in metres of the map; ``tif`` and ``geojson`` only
-    obstacles, placed on Earth.
+    ``ply``, ``pcd``, ``bt`` and ``mcap`` (a ROS 2 bag with one octomap_msgs/Octomap) hold every occupied voxel, known
+    ground too, in metres of the map; ``tif`` and ``geojson`` only obstacles, placed on Earth.
     """
     head = folded.last
     if head is None or len(folded.voxels.occupied().keys) == 0:
         raise ExportError("The map is empty.", advice="Fly first, with the sensor switched on.")
-    if kind == "ply":
-        held = folded.voxels.occupied()
-        return ply(_centres(held, head.resolution_m), probability=held.probability / 255.0)
+    if kind in ("ply", "pcd"):
+        held, write = folded.voxels.occupied(), ply if kind == "ply" else pcd
+        return write(_centres(held, head.resolution_m), probability=held.probability / 255.0)
     if kind == "bt":
-        return _bt(folded.voxels, head.resolution_m)
+        return write_bt(_map_of(folded.voxels, head.resolution_m))
+    if kind == "mcap":
+        return _mcap(folded.voxels, head)
     obstacles = folded.voxels.occupied(include_explained=False)
     return _tif(obstacles, head) if kind == "tif" else _geojson(obstacles, head)
 
@@ -63,22 +68,35 @@ def _centres(voxels: Voxels, resolution_m: float) -> F64:
     return (voxels.keys.astype(np.float64) + 0.5) * resolution_m
 
 
-def _bt(voxels: Voxels, resolution_m: float) -> bytes:
+def _map_of(voxels: Voxels, resolution_m: float) -> VoxelMap:
     the_map = VoxelMap(resolution_m=resolution_m)
     the_map.assign(voxels.keys, voxels.probability > 127)
-    return write_bt(the_map)
+    return the_map
+
+
+def _mcap(voxels: Voxels, head: MapDelta) -> bytes:
+    """A ROS 2 bag of one message, at the time of the map's newest frame."""
+    from telemetry.recording.ros.ros2_writer import Ros2Writer  # reads many definitions
+
+    _, data = tree_data(_map_of(voxels, head.resolution_m))
+    with tempfile.TemporaryDirectory(prefix="hedgehop-") as folder:
+        path = Path(folder) / "map.mcap"
+        with Ros2Writer(path, library="hedgehop ros2") as writer:
+            stamp_ns = max(0, round(head.t_utc_s * 1e9))
+            writer.octomap(OCTOMAP_TOPIC, stamp_ns, MAP_FRAME, head.resolution_m, data)
+        return path.read_bytes()
 
 
 def _tif(obstacles: Voxels, head: MapDelta) -> bytes:
     """Height above sea level of the highest obstacle in each cell; unknown where there is none."""
     edge_m, keys = head.resolution_m, obstacles.keys
     if len(keys) == 0:
-        raise ExportError("There are no obstacles in the map, only known ground.", advice="Choose PLY or .bt.")
+        raise ExportError("There are no obstacles in the map, only known ground.", advice="Choose .ply, .pcd or .bt.")
     west, south = keys[:, 0].min(), keys[:, 1].min()
     cols, rows = int(keys[:, 0].max()) - int(west) + 1, int(keys[:, 1].max()) - int(south) + 1
     if rows * cols > MOST_CELLS:
         what = f"A grid of {cols:,} x {rows:,} cells does not fit: {MOST_CELLS:,} are the most."
-        raise ExportError(what, advice="Choose PLY or GeoJSON.")
+        raise ExportError(what, advice="Choose .ply, .pcd or .geojson.")
     top_m = np.full((rows, cols), -np.inf, np.float32)
     height_m = (keys[:, 2] + 1.0) * edge_m + head.origin.alt_amsl_m
     np.maximum.at(top_m, (rows - 1 - (keys[:, 1] - south), keys[:, 0] - west), height_m.astype(np.float32))

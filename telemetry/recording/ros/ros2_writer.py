@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from mcap.writer import Writer
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from mapping.geometry.arrays import F32, F64
 from telemetry.recording.ros.bag_types import CLOUD, FIX, ODOMETRY, TF
@@ -20,6 +20,9 @@ _NO_FIX, _FIX, _GPS = -1, 0, 1
 """Of sensor_msgs/NavSatStatus."""
 _FLOAT32 = 7
 """Of sensor_msgs/PointField."""
+_OCTOMAP = "octomap_msgs/msg/Octomap"
+_OCTOMAP_FIELDS = "std_msgs/Header header\nbool binary\nstring id\nfloat64 resolution\nint8[] data\n"
+"""As octomap_msgs has it; ROS's own packages do not bring it."""
 
 
 class Ros2Writer:
@@ -27,6 +30,7 @@ class Ros2Writer:
 
     def __init__(self, path: Path, *, library: str) -> None:
         self._store: Any = get_typestore(Stores.ROS2_HUMBLE)
+        self._store.register(get_types_from_msg(_OCTOMAP_FIELDS, _OCTOMAP))
         self._path, self._aside = path, path.with_name(f".tmp-{path.name}-{token_hex(8)}")
         self._file = self._aside.open("wb")
         self._writer = Writer(self._file)
@@ -80,6 +84,11 @@ class Ros2Writer:
         header = self._header(stamp_ns, frame)
         is_dense = bool(np.isfinite(rows).all())
         self._write(topic, stamp_ns, CLOUD, header, 1, len(rows), fields, False, step, len(data), data, is_dense)
+
+    def octomap(self, topic: str, stamp_ns: int, frame: str, resolution_m: float, data: bytes) -> None:
+        """A binary tree: ``data`` as ``tree_data`` makes it."""
+        tree = np.frombuffer(data, np.int8)
+        self._write(topic, stamp_ns, _OCTOMAP, self._header(stamp_ns, frame), True, "OcTree", resolution_m, tree)
 
     def _make(self, name: str, *values: Any) -> Any:
         return self._store.types[name](*values)

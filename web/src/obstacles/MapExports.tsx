@@ -8,7 +8,9 @@ import { SENSOR_WORDS } from "./obstacle_words";
 
 const FILES = [
   { format: "ply", note: "points, for any 3D program" },
+  { format: "pcd", note: "points, for the Point Cloud Library" },
   { format: "bt", note: "OctoMap" },
+  { format: "mcap", note: "OctoMap in a ROS 2 bag" },
   { format: "tif", note: "GeoTIFF of the highest obstacle" },
   { format: "geojson", note: "obstacles with coordinates" },
 ] as const;
