@@ -20,6 +20,7 @@ router = APIRouter(prefix="/api", tags=["terrain"], responses=ERROR_RESPONSES)
 
 FileName = Annotated[str, Query(max_length=1000)]
 Declared = Annotated[str, Query(max_length=10_000)]
+Number = Annotated[str, Query(max_length=20, pattern=r"^[0-9.eE+-]*$")]
 RAW_BODY: dict[str, Any] = {"requestBody": {"content": {"application/octet-stream": {}}, "required": True}}
 
 
@@ -29,14 +30,20 @@ async def add_terrain(
     workspace: Work,
     filename: FileName,
     crs: Declared = "",
-    z_scale: Annotated[str, Query(max_length=20, pattern=r"^[0-9.eE+-]*$")] = "",
+    z_scale: Number = "",
     vertical_datum: Declared = "",
     remove_spikes: bool = False,
+    cell_m: Number = "",
+    keep_noise: bool = False,
     folder: Annotated[str, Query(max_length=1000)] = "",
     file_utc: Annotated[datetime | None, Query()] = None,
 ) -> Response:
-    """A GeoTIFF or ESRI ASCII grid; what the file does not say can be declared. Empty: nothing is."""
-    scale = _positive(z_scale)
+    """A GeoTIFF, an ESRI ASCII grid, or a point cloud (LAS, LAZ, COPC, PLY, PCD, E57), told by the content.
+
+    What the file does not say can be declared; empty: nothing is. ``cell_m`` and ``keep_noise`` are for clouds.
+    """
+    scale = _positive(z_scale, "z_scale", "metres per stored unit, such as 0.01")
+    cells = _positive(cell_m, "cell_m", "metres, such as 0.25")
     name = display_name(filename)
     upload = await stream_to_disk(request, parts_of(request).library.new_upload(suffix_of(name)))
     job = workspace.files.add_terrain(
@@ -47,6 +54,8 @@ async def add_terrain(
         z_scale=scale,
         vertical_datum=vertical_datum.strip() or None,
         remove_spikes=remove_spikes,
+        cell_m=cells,
+        keep_noise=keep_noise,
     )
     return answer(job, 202)
 
@@ -95,13 +104,11 @@ async def cancel_job(job_id: str, workspace: Work) -> Response:
     return Response(status_code=204)
 
 
-def _positive(text: str) -> float | None:
-    """The z-scale; the reader itself refuses what makes no sense as one."""
+def _positive(text: str, where: str, such: str) -> float | None:
+    """A number; the reader itself refuses what makes no sense as one."""
     if not text:
         return None
     try:
         return float(text)
     except ValueError:
-        raise BadRequestError(
-            f"{text!r} is no number.", where="z_scale", advice="Give metres per stored unit, such as 0.01."
-        ) from None
+        raise BadRequestError(f"{text!r} is no number.", where=where, advice=f"Give {such}.") from None

@@ -13,15 +13,17 @@ from pyproj import CRS
 
 from planning.errors import NoElevationError
 from planning.terrain.dsm import Dsm
+from planning.terrain.spikes import Spike
 from server.library.shelf import read_manifest, utc_now, write_manifest
 from server.library.stored_arrays import read_array, write_array
 from server.library.stored_cells import CellsManifest, read_cells, write_cells
 from server.library.whole_files import new_directory, new_id
-from server.schemas import PlaceDoc, SpikeDoc, TerrainDoc
+from server.schemas import CloudDoc, PlaceDoc, SpikeDoc, TerrainDoc
 from telemetry.topics.obstacles import GroundNotice
 
 FOLDER = "terrains"
 _ELEVATION = "elevation.npy"
+_MAX_SPIKES = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +57,13 @@ def store_terrain(
     origin: Origin = UNKNOWN_ORIGIN,
     spikes: Sequence[SpikeDoc] = (),
     warnings: Sequence[str] = (),
+    cloud: CloudDoc | None = None,
 ) -> TerrainDoc:
     """Adds a model to the data directory ``root``, from any process; raises ``StorageFullError``."""
     terrain_id = new_id()
     t = dsm.transform
     doc = _describe(dsm, terrain_id, name=name, origin=origin, spikes=spikes, warnings=warnings)
+    doc = doc.model_copy(update={"cloud": cloud})
     with new_directory(root / FOLDER / terrain_id) as folder:
         write_array(folder / _ELEVATION, dsm.elevation_m)
         source = write_cells(folder, dsm.source) if dsm.source else None
@@ -132,3 +136,17 @@ def _corners(dsm: Dsm) -> list[PlaceDoc]:
     west, south, east, north = dsm.bounds_m
     corners_xy_m = np.array([(west, north), (east, north), (east, south), (west, south)])
     return [PlaceDoc(lat_deg=lat, lon_deg=lon) for lat, lon in dsm.lat_lon_from_xy(corners_xy_m).tolist()]
+
+
+def spike_docs(spikes: Sequence[Spike]) -> list[SpikeDoc]:
+    """The tallest ones, enough for a list that somebody reads."""
+    tallest = sorted(spikes, key=lambda spike: -spike.height_m)[:_MAX_SPIKES]
+    return [
+        SpikeDoc(
+            lat_deg=spike.lat_deg,
+            lon_deg=spike.lon_deg,
+            size_m=spike.size_m,
+            height_m=spike.height_m if spike.kind == "spike" else -spike.height_m,
+        )
+        for spike in tallest
+    ]

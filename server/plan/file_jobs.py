@@ -36,8 +36,10 @@ class FileJobs:
         z_scale: float | None,
         vertical_datum: str | None,
         remove_spikes: bool,
+        cell_m: float | None = None,
+        keep_noise: bool = False,
     ) -> JobDoc:
-        """Reads an uploaded surface model; the open plan takes it unless it has points on another one."""
+        """Reads an uploaded model or point cloud; the open plan takes it unless it has points on another one."""
 
         async def work(lane: Lane, progress: Progress) -> None:
             terrain: TerrainDoc = await self._made(
@@ -51,6 +53,8 @@ class FileJobs:
                     z_scale=z_scale,
                     vertical_datum=vertical_datum,
                     remove_spikes=remove_spikes,
+                    cell_m=cell_m,
+                    keep_noise=keep_noise,
                     progress=progress,
                 ),
             )

@@ -2,30 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from pydantic import ValidationError
 
-from planning.errors import DescribedError, FormatError, PlanningError
+from planning.errors import DescribedError, FormatError, ParameterError, PlanningError
 from planning.formats.fence_files import is_fence, read_fence
 from planning.formats.poi_files import looks_swapped, read_pois
 from planning.ground.demo_hillside import demo_dsm, small_hill
+from planning.terrain.clouds.cloud_header import is_cloud
+from planning.terrain.clouds.read import CloudParams
 from planning.terrain.geotiff import read_dsm_reported, read_orthophoto
-from planning.terrain.spikes import Spike, find_spikes
+from planning.terrain.spikes import find_spikes
 from planning.terrain.spikes import remove_spikes as without
 from server.errors import error_doc
 from server.library.documents import doc_of_points
 from server.library.fences import with_fence
 from server.library.orthophotos import store_orthophoto
 from server.library.shelf import read_manifest
-from server.library.terrains import Origin, TerrainManifest, load_terrain, store_terrain
-from server.schemas import OrthophotoDoc, PlanDoc, SpikeDoc, TerrainDoc
+from server.library.terrains import Origin, TerrainManifest, load_terrain, spike_docs, store_terrain
+from server.plan.cloud_task import import_cloud
+from server.schemas import OrthophotoDoc, PlanDoc, TerrainDoc
 from server.work.jobs import Progress
 
 _STAGES = {"decode": "Reading", "resample": "Resampling", "spikes": "Looking for spikes"}
-_MAX_SPIKES = 100
 
 
 @contextmanager
@@ -56,10 +58,20 @@ def import_terrain(
     z_scale: float | None,
     vertical_datum: str | None,
     remove_spikes: bool,
+    cell_m: float | None,
+    keep_noise: bool,
     report: Progress,
 ) -> TerrainDoc:
-    """Reads an uploaded surface model into the library. Raises RasterError."""
+    """Reads an uploaded surface model, or makes one of a point cloud, into the library. Raises RasterError."""
     with named(upload, filename):
+        if is_cloud(upload):
+            params = CloudParams(cell_m, crs, vertical_datum, z_scale, keep_noise)
+            return import_cloud(
+                root, upload, filename, origin=origin, params=params, without_spikes=remove_spikes, report=report
+            )
+        if cell_m is not None or keep_noise:
+            what = "Cell size and noise are asked of point clouds: a raster has its own cells."
+            raise ParameterError(what, where=filename, advice="Leave both out.")
         dsm, found = read_dsm_reported(
             upload,
             crs=crs,
@@ -133,17 +145,3 @@ def make_demo_terrain(root: Path, name: str, *, report: Progress) -> TerrainDoc:
     """Generates the demo's surface model."""
     report("Generating the demo surface model", None)
     return store_terrain(root, demo_dsm(), name=name)
-
-
-def spike_docs(spikes: Sequence[Spike]) -> list[SpikeDoc]:
-    """The tallest ones, enough for a list that somebody reads."""
-    tallest = sorted(spikes, key=lambda spike: -spike.height_m)[:_MAX_SPIKES]
-    return [
-        SpikeDoc(
-            lat_deg=spike.lat_deg,
-            lon_deg=spike.lon_deg,
-            size_m=spike.size_m,
-            height_m=spike.height_m if spike.kind == "spike" else -spike.height_m,
-        )
-        for spike in tallest
-    ]

@@ -14,6 +14,7 @@ from server.schemas.account_docs import (
     SessionDoc,
     SignIn,
 )
+from server.schemas.bag_docs import BagDoc, BagRecordedDoc, BagRecordingBody, BagTopicDoc
 from server.schemas.checklist_docs import ChecklistDoc, ChecklistText, TickBody, WriteChecklist
 from server.schemas.flight_docs import (
     AdoptVehicle,
@@ -42,6 +43,8 @@ from server.schemas.flight_docs import (
 )
 from server.schemas.guided_docs import FlyWayBody, GuidedState, WayAction, WayBody, WayDoc, WaySpeedBody
 from server.schemas.library_docs import (
+    CloudDoc,
+    CloudShareDoc,
     JobDoc,
     LibraryState,
     OrthophotoDoc,

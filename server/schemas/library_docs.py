@@ -17,6 +17,39 @@ class SpikeDoc(Strict):
     """Positive: spike; negative: pit."""
 
 
+class CloudShareDoc(Strict):
+    what: str
+    """Ground, vegetation, buildings..."""
+    share: float
+    """Of the points that were taken, 0..1."""
+
+
+class CloudDoc(Strict):
+    """The point cloud that a surface model was made of."""
+
+    points: int
+    taken: int
+    noise: int
+    """Left out because the file calls them so."""
+    not_numbers: int
+    points_per_m2: float
+    """Of the cells that have any."""
+    cell_chosen: bool
+    """By the operator; else by the density."""
+    shares: list[CloudShareDoc]
+    """Largest first; empty where no point is classified."""
+    canopy_greatest_m: float | None
+    """The highest point above the ground point of the same cell."""
+    canopy_median_m: float | None
+    """Of the cells that stand 2 m or more above their ground."""
+    canopy_share: float | None
+    """Of them, among the cells that have ground points."""
+    small_holes: int
+    """Holes that a plan fills with the highest cell around them."""
+    small_holes_m2: float
+    small_hole_limit_m2: float
+
+
 class TerrainDoc(Strict):
     id: str
     name: str
@@ -38,6 +71,8 @@ class TerrainDoc(Strict):
     """Where the file lay, as far as the page that sent it could tell; empty: it could not."""
     file_utc: str | None = None
     """When the file was last changed."""
+    cloud: CloudDoc | None = None
+    """Null: it comes of no point cloud."""
 
 
 class OrthophotoDoc(Strict):

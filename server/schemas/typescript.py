@@ -15,6 +15,7 @@ from pydantic.fields import FieldInfo
 from server import schemas
 from server.schemas import (
     account_docs,
+    bag_docs,
     checklist_docs,
     flight_docs,
     guided_docs,
@@ -37,6 +38,8 @@ from telemetry.topics.messages import LOST_S, STALE_S
 ANSWERS = (
     schemas.Imported,
     schemas.RadarOpened,
+    schemas.BagDoc,
+    schemas.BagRecordedDoc,
     schemas.RadarFrame,
     schemas.RadarTracksDoc,
     schemas.ScenarioDoc,
@@ -90,6 +93,7 @@ def _models() -> Iterator[type[BaseModel]]:
         flight_docs,
         guided_docs,
         review_docs,
+        bag_docs,
         obstacle_docs,
         parameter_docs,
         traversability_docs,

@@ -42,12 +42,19 @@ def test_an_upload_reaches_the_job_whole(served: Running) -> None:
         "z_scale": 0.01,
         "vertical_datum": None,
         "remove_spikes": False,
+        "cell_m": None,
+        "keep_noise": False,
     }
 
 
 @pytest.mark.parametrize(
     ("query", "where"),
-    [({"z_scale": "1e"}, "z_scale"), ({"remove_spikes": "perhaps"}, ""), ({"file_utc": "yesterday"}, "file_utc")],
+    [
+        ({"z_scale": "1e"}, "z_scale"),
+        ({"cell_m": "--"}, "cell_m"),
+        ({"remove_spikes": "perhaps"}, ""),
+        ({"file_utc": "yesterday"}, "file_utc"),
+    ],
 )
 def test_wrong_options_are_refused_before_the_body(served: Running, query: dict, where: str) -> None:
     response = served.http.post("/api/terrains", params={"filename": "x.tif", **query}, content=b"x", headers=RAW)

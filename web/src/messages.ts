@@ -102,6 +102,12 @@ export const LIMITS = {
   WaySpeedBody: {
     speed_m_s: { min: 0.5, max: 20.0 },
   },
+  BagRecordingBody: {
+    max_gap_s: { min: 0.01, max: 60, initial: 0.5 },
+    home_lat_deg: { min: -90, max: 90 },
+    home_lon_deg: { min: -180, max: 180 },
+    home_alt_amsl_m: { min: -500, max: 9_000 },
+  },
   SectionAsked: {
     thickness_m: { min: 0.5, max: 50, initial: 4.0 },
     reach_m: { min: 10, max: 150, initial: 25 },
@@ -1154,6 +1160,38 @@ export interface SpikeDoc {
   height_m: number;
 }
 
+export interface CloudShareDoc {
+  /** Ground, vegetation, buildings... */
+  what: string;
+  /** Of the points that were taken, 0..1. */
+  share: number;
+}
+
+/** The point cloud that a surface model was made of. */
+export interface CloudDoc {
+  points: number;
+  taken: number;
+  /** Left out because the file calls them so. */
+  noise: number;
+  not_numbers: number;
+  /** Of the cells that have any. */
+  points_per_m2: number;
+  /** By the operator; else by the density. */
+  cell_chosen: boolean;
+  /** Largest first; empty where no point is classified. */
+  shares: CloudShareDoc[];
+  /** The highest point above the ground point of the same cell. */
+  canopy_greatest_m: number | null;
+  /** Of the cells that stand 2 m or more above their ground. */
+  canopy_median_m: number | null;
+  /** Of them, among the cells that have ground points. */
+  canopy_share: number | null;
+  /** Holes that a plan fills with the highest cell around them. */
+  small_holes: number;
+  small_holes_m2: number;
+  small_hole_limit_m2: number;
+}
+
 export interface TerrainDoc {
   id: string;
   name: string;
@@ -1175,6 +1213,8 @@ export interface TerrainDoc {
   folder: string;
   /** When the file was last changed. */
   file_utc: string | null;
+  /** Null: it comes of no point cloud. */
+  cloud: CloudDoc | null;
 }
 
 export interface OrthophotoDoc {
@@ -1778,6 +1818,55 @@ export interface ReviewDoc {
   /** As it was ticked for this flight's start; null where nothing was demanded. */
   checklist: ChecklistRecord | null;
   /** What had to be assumed or could not be told. */
+  notes: string[];
+}
+
+export interface BagTopicDoc {
+  name: string;
+  /** As ROS 2 writes it. */
+  type: string;
+  role: "points" | "poses" | "transforms" | "fix" | "other";
+  /** That can be read. */
+  messages: number;
+  /** As the bag's own index counts them. */
+  said: number;
+  /** When the first was recorded; null: there is none, or by a clock that does not tell the date. */
+  first_utc: string | null;
+  span_s: number | null;
+}
+
+/** An uploaded bag; it is kept until it is put away, newer ones come, or the server ends. */
+export interface BagDoc {
+  id: string;
+  name: string;
+  kind: "ros1" | "folder" | "mcap" | "db3";
+  bytes: number;
+  /** What a recording can be made of first. */
+  topics: BagTopicDoc[];
+  /** What it lacks, and what that means, a sentence each. */
+  missing: string[];
+}
+
+/** As the options of ``hedgehop bag``. */
+export interface BagRecordingBody {
+  /** Of PointCloud2, LaserScan or Range. */
+  points: string;
+  /** Null: the only topic of poses, else the transforms. */
+  pose?: string | null;
+  /** The robot's; null: as its poses say, else base_link. */
+  frame?: string | null;
+  sensor?: "radar" | "vision" | "ranges";
+  max_gap_s?: number;
+  home_lat_deg?: number | null;
+  /** Of the first pose; null: by a NavSatFix of the bag. */
+  home_lon_deg?: number | null;
+  /** Of the first pose, above sea level. */
+  home_alt_amsl_m: number;
+}
+
+export interface BagRecordedDoc {
+  recording: RecordingDoc;
+  /** What was assumed and left out, a sentence each. */
   notes: string[];
 }
 

@@ -43,7 +43,8 @@ class LasFile:
     def chunks(self) -> Iterator[Chunk]:
         """(N, 3) x, y, z in the file's units, and (N,) classes; deleted ("withheld") points are left out."""
         read = 0
-        with laspy.open(self.path, decompression_selection=_NEEDED) as file:
+        # Its types leave this argument out.
+        with laspy.open(self.path, decompression_selection=_NEEDED) as file:  # pyright: ignore[reportCallIssue]
             for points in file.chunk_iterator(CHUNK):
                 read += len(points)
                 xyz = np.column_stack([np.asarray(axis) for axis in (points.x, points.y, points.z)])

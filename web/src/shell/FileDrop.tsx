@@ -21,8 +21,9 @@ function Kinds() {
       <Icon name="import" size={40} />
       <p class="drop-title">Drop to open</p>
       <p>Surface model: GeoTIFF or ESRI ASCII grid</p>
+      <p>Point cloud: LAS, LAZ, COPC, PLY, PCD, E57</p>
       <p>Points or polygon: CSV, GeoJSON, KML, KMZ, .waypoints, .plan</p>
-      <p>Recorded flight: .mcap, .tlog, .bin, .ulg</p>
+      <p>Recorded flight: .mcap, .tlog, .bin, .ulg; ROS bag: .bag, .db3, .mcap, .zip</p>
       <p>UWB radar log: .npz; raw radar samples: .npy, .bin</p>
     </>
   );

@@ -2,7 +2,8 @@
 
 const folders = new WeakMap<File, string>();
 const DEEPEST = 4;
-const OPENED = /\.(tiff?|asc|csv|geojson|json|kml|kmz|waypoints|plan|tlog|mcap|ulg|npz|npy|bin)$/i;
+const OPENED =
+  /\.(tiff?|asc|las|laz|ply|pcd|e57|csv|geojson|json|kml|kmz|waypoints|plan|tlog|mcap|ulg|npz|npy|bin|bag|db3)$/i;
 
 export const folderOf = (file: File): string => folders.get(file) ?? "";
 

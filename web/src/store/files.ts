@@ -27,9 +27,24 @@ export interface RasterHints {
   z_scale: string;
   vertical_datum: string;
   remove_spikes: boolean;
+  /** Of a point cloud's model; empty: by its density. */
+  cell_m: string;
+  /** Points that the cloud calls noise count as well. */
+  keep_noise: boolean;
 }
 
-export const NO_HINTS: RasterHints = { crs: "", z_scale: "", vertical_datum: "", remove_spikes: false };
+export const NO_HINTS: RasterHints = {
+  crs: "",
+  z_scale: "",
+  vertical_datum: "",
+  remove_spikes: false,
+  cell_m: "",
+  keep_noise: false,
+};
+
+/** What is made a surface model of; told for sure by its content, on the server. */
+export const isCloud = (name: string) => /\.(las|laz|ply|pcd|e57)$/i.test(name);
+export const MODEL_FILES = ".tif,.tiff,.asc,.txt,.las,.laz,.ply,.pcd,.e57";
 
 export const sending = signal<Sending[]>([]);
 /** Files by the job that reads them: kept so that a file can be sent again with what was missing. */
@@ -70,6 +85,8 @@ export async function sendTerrain(
   if (hints.z_scale) query.set("z_scale", hints.z_scale);
   if (hints.vertical_datum) query.set("vertical_datum", hints.vertical_datum);
   if (hints.remove_spikes) query.set("remove_spikes", "true");
+  if (hints.cell_m) query.set("cell_m", hints.cell_m);
+  if (hints.keep_noise) query.set("keep_noise", "true");
   try {
     const job = JSON.parse(await sendFile(`/api/terrains?${query}`, file)) as JobDoc;
     sentFiles.value = new Map(sentFiles.value).set(job.id, { file, hints, replaces });
@@ -162,12 +179,12 @@ export function takeFiles(files: Iterable<File>): void {
 const DATAFLASH = [0xa3, 0x95];
 
 async function isRecording(file: File): Promise<boolean> {
-  if (!/\.bin$/i.test(file.name)) return /\.(tlog|mcap|ulg)$/i.test(file.name);
+  if (!/\.bin$/i.test(file.name)) return /\.(tlog|mcap|ulg|bag|db3|zip)$/i.test(file.name);
   const head = new Uint8Array(await file.slice(0, DATAFLASH.length).arrayBuffer());
   return DATAFLASH.every((byte, index) => head[index] === byte);
 }
 
-/** Which of the files are flights: recordings, and logs of ground stations and vehicles. */
+/** Which of the files are flights: recordings, logs of ground stations and vehicles, and bags of robots. */
 export async function recordingsAmong(files: readonly File[]): Promise<ReadonlySet<File>> {
   const found = await Promise.all(files.map((file) => isRecording(file).catch(() => false)));
   return new Set(files.filter((_, index) => found[index]));

@@ -5,6 +5,8 @@ import { ErrorPanel } from "../../ui/Outcome";
 import { Check, SelectField } from "../../ui/fields";
 import {
   forgetJob,
+  isCloud,
+  MODEL_FILES,
   NO_HINTS,
   sendOrthophoto,
   sendTerrain,
@@ -18,6 +20,10 @@ import { chooseFiles } from "../../ui/choose_files";
 
 /** Errors that a declaration of the operator can mend, or that a wrong one has made. */
 const MENDABLE = new Set(["raster_no_crs", "raster", "parameter", "datum"]);
+
+/** Of a point cloud, larger cells mend that there would be too many. */
+const mends = (name: string, code: string) =>
+  MENDABLE.has(code) || (code === "raster_too_large" && isCloud(name));
 
 const DATUMS = [
   { value: "", label: "unknown" },
@@ -35,12 +41,14 @@ const SCALES = [
 interface FormProps {
   name: string;
   hints: RasterHints;
+  /** Edge of a cloud's cells as it was made, in metres. */
+  made_m?: number;
   onSubmit: (hints: RasterHints) => void;
   onLeave: () => void;
 }
 
 /** Asks for what the file does not say. */
-function HintForm({ name, hints, onSubmit, onLeave }: FormProps) {
+function HintForm({ name, hints, made_m, onSubmit, onLeave }: FormProps) {
   const [draft, setDraft] = useState(hints);
   const form = useRef<HTMLFormElement>(null);
   useEffect(() => form.current?.scrollIntoView({ block: "nearest" }), []);
@@ -72,6 +80,32 @@ function HintForm({ name, hints, onSubmit, onLeave }: FormProps) {
         options={DATUMS}
         onChange={(vertical_datum) => setDraft({ ...draft, vertical_datum })}
       />
+      {isCloud(name) && (
+        <>
+          <label class="field">
+            <span>Cell, m</span>
+            <input
+              type="number"
+              min={0.01}
+              step="any"
+              placeholder={made_m ? `${made_m} by density` : "by density"}
+              value={draft.cell_m}
+              data-testid="cloud-cell"
+              onInput={(event) => setDraft({ ...draft, cell_m: event.currentTarget.value })}
+            />
+          </label>
+          <Check
+            label="Points called noise count too"
+            checked={draft.keep_noise}
+            testid="cloud-noise"
+            onChange={(keep_noise) => setDraft({ ...draft, keep_noise })}
+          />
+          <p class="hint">
+            Metres around a place: CRS +proj=tmerc +lat_0=45.1 +lon_0=7.2 +units=m, with its own latitude and
+            longitude.
+          </p>
+        </>
+      )}
       <Check
         label="Remove isolated spikes"
         checked={draft.remove_spikes}
@@ -90,14 +124,22 @@ function HintForm({ name, hints, onSubmit, onLeave }: FormProps) {
 }
 
 /** A surface model that was read, read once more with other declarations; the plan then takes the new one. */
-export function ReadAgain({ name, onDone }: { name: string; onDone: () => void }) {
+export function ReadAgain({ name, made_m, onDone }: { name: string; made_m?: number; onDone: () => void }) {
   const sent = sentFileOf(name);
   const send = (hints: RasterHints) => {
     onDone();
     if (sent) void sendTerrain(sent.file, hints, true);
-    else chooseFiles(".tif,.tiff,.asc,.txt", ([file]) => file && void sendTerrain(file, hints, true));
+    else chooseFiles(MODEL_FILES, ([file]) => file && void sendTerrain(file, hints, true));
   };
-  return <HintForm name={name} hints={sent?.hints ?? NO_HINTS} onSubmit={send} onLeave={onDone} />;
+  return (
+    <HintForm
+      name={name}
+      hints={sent?.hints ?? NO_HINTS}
+      {...(made_m === undefined ? {} : { made_m })}
+      onSubmit={send}
+      onLeave={onDone}
+    />
+  );
 }
 
 /** A photo was given where a surface model belongs: it can be draped over the one in use. */
@@ -125,7 +167,7 @@ export function FailedJobs() {
       {failed.map((job) => {
         const sent = sentFiles.value.get(job.id);
         const isPhoto = job.error?.what.includes("orthomosaic") ?? false;
-        const asks = sent && job.error && MENDABLE.has(job.error.code) && !isPhoto;
+        const asks = sent && job.error && mends(sent.file.name, job.error.code) && !isPhoto;
         return (
           <div key={job.id} data-testid="failed-job">
             {job.error && <ErrorPanel error={job.error} onClose={() => forgetJob(job.id)} />}

@@ -5,15 +5,13 @@ import { Icon } from "../../ui/Icon";
 import { Section } from "../../ui/Section";
 import { chooseFiles } from "../../ui/choose_files";
 import { offered, useTerrain } from "../../store/arrivals";
-import { sendOrthophoto, sendTerrain } from "../../store/files";
+import { MODEL_FILES, sendOrthophoto, sendTerrain } from "../../store/files";
 import { edit } from "../../store/plan";
 import { library, terrain } from "../../store/state";
 import { deleteTerrain, newPlan, useDemo } from "../../store/plans";
 import { LayerControls } from "./Layers";
 import { FailedJobs } from "./RasterHints";
 import { TerrainFacts } from "./TerrainFacts";
-
-const RASTERS = ".tif,.tiff,.asc,.txt";
 
 /** A model that arrived while the plan had points on another one: what to do with it. */
 function Offer({ plan }: { plan: PlanDoc }) {
@@ -126,13 +124,13 @@ function Orthophotos({ plan, entry }: { plan: PlanDoc; entry: TerrainDoc }) {
 }
 
 function AddTerrain({ isFirst }: { isFirst: boolean }) {
-  const choose = () => chooseFiles(RASTERS, (files) => files.forEach((file) => void sendTerrain(file)));
+  const choose = () => chooseFiles(MODEL_FILES, (files) => files.forEach((file) => void sendTerrain(file)));
   return (
     <div class={`drop-zone ${isFirst ? "first" : ""}`} data-testid="terrain-drop">
-      {isFirst && <p>Drop a GeoTIFF anywhere on this page</p>}
+      {isFirst && <p>Drop a GeoTIFF or a point cloud anywhere on this page</p>}
       <div class="row">
         <Button icon="import" testid="terrain-file" onClick={choose}>
-          Open GeoTIFF…
+          Open model…
         </Button>
         <Button icon="terrain" testid="demo-button" onClick={() => void useDemo()}>
           Demo

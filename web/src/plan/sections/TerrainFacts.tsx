@@ -1,6 +1,6 @@
 import { useState } from "preact/hooks";
 import { forConsole, metres, number, percent } from "../../format";
-import type { TerrainDoc } from "../../messages";
+import type { CloudDoc, TerrainDoc } from "../../messages";
 import { Button } from "../../ui/Button";
 import { Icon } from "../../ui/Icon";
 import { removeSpikes } from "../../store/plans";
@@ -20,6 +20,58 @@ function Spikes({ entry }: { entry: TerrainDoc }) {
         Remove
       </Button>
     </div>
+  );
+}
+
+const leftOut = ({ noise, not_numbers }: CloudDoc) =>
+  [noise > 0 && `${number(noise)} noise`, not_numbers > 0 && `${number(not_numbers)} without a place`]
+    .filter(Boolean)
+    .join(", ");
+
+/** The point cloud that a model was made of: what its points are, and what became of them. */
+function CloudFacts({ cloud, cell_m }: { cloud: CloudDoc; cell_m: number }) {
+  const { canopy_share, canopy_median_m, canopy_greatest_m } = cloud;
+  return (
+    <dl class="facts-list" data-testid="cloud-facts">
+      <dt>Points</dt>
+      <dd>
+        {number(cloud.taken)} of {number(cloud.points)}, {number(cloud.points_per_m2, 1)} per m²
+      </dd>
+      {leftOut(cloud) && (
+        <>
+          <dt>Left out</dt>
+          <dd>{leftOut(cloud)}</dd>
+        </>
+      )}
+      <dt>Cells</dt>
+      <dd>
+        {metres(cell_m, 2)}, {cloud.cell_chosen ? "as chosen" : "by the density"}; each as high as its highest
+        point
+      </dd>
+      {cloud.shares.length > 0 && (
+        <>
+          <dt>Classes</dt>
+          <dd>{cloud.shares.map(({ what, share }) => `${what} ${percent(share, 1)}`).join(", ")}</dd>
+        </>
+      )}
+      {canopy_share !== null && (
+        <>
+          <dt>Above ground</dt>
+          <dd>
+            {percent(canopy_share)} of the cells with ground points by 2 m or more
+            {canopy_median_m !== null && `, half of them by ${metres(canopy_median_m)} or more`}, at most{" "}
+            {metres(canopy_greatest_m)}
+          </dd>
+        </>
+      )}
+      <dt>Small holes</dt>
+      <dd>
+        {cloud.small_holes === 0
+          ? "none"
+          : `${number(cloud.small_holes)}, ${number(cloud.small_holes_m2, 1)} m² in all: plans fill each with its highest neighbour`}
+        ; larger ones than {number(cloud.small_hole_limit_m2)} m² stay unknown
+      </dd>
+    </dl>
   );
 }
 
@@ -52,6 +104,7 @@ export function TerrainFacts({ entry }: { entry: TerrainDoc }) {
           <dt>Resolution</dt>
           <dd>{metres(entry.resolution_m, 3)} per cell</dd>
         </dl>
+        {entry.cloud && <CloudFacts cloud={entry.cloud} cell_m={entry.resolution_m} />}
       </details>
       <Spikes entry={entry} />
       {entry.warnings.map((warning) => (
@@ -60,10 +113,14 @@ export function TerrainFacts({ entry }: { entry: TerrainDoc }) {
         </p>
       ))}
       {rereadId === entry.id ? (
-        <ReadAgain name={entry.name} onDone={() => setRereadId(null)} />
+        <ReadAgain
+          name={entry.name}
+          {...(entry.cloud && !entry.cloud.cell_chosen ? { made_m: entry.resolution_m } : {})}
+          onDone={() => setRereadId(null)}
+        />
       ) : (
         <Button kind="quiet" icon="import" testid="read-again" onClick={() => setRereadId(entry.id)}>
-          Declare CRS, unit or datum…
+          Declare CRS, unit{entry.cloud ? ", cells" : ""} or datum…
         </Button>
       )}
     </>
