@@ -12,6 +12,7 @@ from server.errors import BadRequestError, NotFoundError
 from server.flying.apart.airspace import Airspace
 from server.flying.apart.nearness import Nearness
 from server.flying.apart.other_vehicles import OtherVehicles
+from server.flying.bags.bag_desk import BagDesk
 from server.flying.checklists import Checklists
 from server.flying.recordings import RecordingDesk
 from server.flying.reviewing import Reviewing
@@ -56,6 +57,7 @@ class Fleet:
             present,
         )
         self.recordings = RecordingDesk(shelf, workspace.board, self.reviewing, present)
+        self.bags = BagDesk(library, workspace.board, self.recordings)
         self.uwb = LiveUwb(workspace.traversability, library, self.first.bus)
         self._nearness = Nearness({flying.number: (flying.name, flying.live) for flying in flights})
         self._others = OtherVehicles(

@@ -1,4 +1,4 @@
-"""Recordings: started and stopped, kept, brought in and taken out, and opened for review."""
+"""Recordings: started and stopped, kept, brought in and taken out, made of bags of ROS, and opened for review."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from fastapi.responses import FileResponse, Response
 from pydantic import RootModel
 
 from server.api.access import DONE, ERROR_RESPONSES, All, Fly, InCharge, answer, parts_of
-from server.api.terrain_routes import RAW_BODY
-from server.door.uploads import display_name, stream_to_disk
+from server.api.terrain_routes import RAW_BODY, FileName
+from server.door.uploads import display_name, stream_to_disk, suffix_of
 from server.library.recording_list import suffix_of_recording
-from server.schemas import OpenReview, PlayReview, RecordingDoc
+from server.schemas import BagDoc, BagRecordedDoc, BagRecordingBody, OpenReview, PlayReview, RecordingDoc
 
 router = APIRouter(prefix="/api", tags=["recordings"], responses=ERROR_RESPONSES)
 
@@ -75,3 +75,28 @@ async def close_review(fleet: All) -> None:
 async def play(body: PlayReview, fleet: All) -> None:
     """Plays, pauses, seeks, changes speed. Nothing that is replayed can reach a vehicle."""
     await fleet.reviewing.play(body)
+
+
+@router.post("/bags", response_model=BagDoc, openapi_extra=RAW_BODY)
+async def add_bag(request: Request, fleet: All, filename: FileName) -> Response:
+    """A ``.bag`` of ROS 1, an ``.mcap`` or ``.db3`` of ROS 2, or a ZIP archive of a bag's folder; told by the content.
+
+    Answers with its topics once it has been read through; the job can be cancelled.
+    """
+    name = display_name(filename)
+    upload = await stream_to_disk(request, parts_of(request).library.new_upload(suffix_of(name)))
+    return answer(await fleet.bags.add(upload, name))
+
+
+@router.post("/bags/{bag_id}/recording", response_model=BagRecordedDoc)
+async def record_bag(bag_id: str, body: BagRecordingBody, fleet: All) -> Response:
+    """Makes a recording of it, which joins the others; the bag is kept, for another sensor.
+
+    422 with what is missing, and what there is instead.
+    """
+    return answer(await fleet.bags.record(bag_id, body))
+
+
+@router.delete("/bags/{bag_id}", **DONE)
+async def forget_bag(bag_id: str, fleet: All) -> None:
+    await fleet.bags.forget(bag_id)

@@ -47,6 +47,8 @@ class BagAsked:
     most_gap_s: float = MOST_GAP_S
     home_alt_amsl_m: float | None = None
     """Height above sea level of the first pose; a NavSatFix tells only that above the ellipsoid."""
+    home_lat_lon_deg: tuple[float, float] | None = None
+    """Of the first pose, where it is known; it counts before a NavSatFix."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,11 +119,15 @@ def _check_radar(bag: PlacedBag, sensor: Sensor) -> None:
 
 
 def _home(contents: BagContents, bag: PlacedBag, asked: BagAsked) -> tuple[float, float, float]:
-    """By the NavSatFix nearest to the first pose; without one, or without its height above the sea, nowhere.
+    """As declared, else by the NavSatFix nearest to the first pose; without either, or without its height, nowhere.
 
     Raises RecordingError where it is of another time.
     """
-    if not len(contents.places) or asked.home_alt_amsl_m is None:
+    if asked.home_alt_amsl_m is None:
+        return _NOWHERE
+    if asked.home_lat_lon_deg is not None:
+        return *asked.home_lat_lon_deg, asked.home_alt_amsl_m
+    if not len(contents.places):
         return _NOWHERE
     apart_s = np.abs(contents.places["stamp_ns"] - bag.origin_ns) / 1e9
     nearest = int(np.argmin(apart_s))

@@ -4,6 +4,7 @@ import { bytes, count, day, duration } from "../format";
 import type { RecordingDoc } from "../messages";
 import { chooseFiles } from "../ui/choose_files";
 import { MapExports } from "../obstacles/MapExports";
+import { isBag, sendBag } from "../store/bags";
 import { sendRecording } from "../store/files";
 import { hasSensors } from "../store/obstacles";
 import { pending } from "../store/outcomes";
@@ -32,6 +33,7 @@ import { Icon } from "../ui/Icon";
 import { Done, Outcome } from "../ui/Outcome";
 import { Section } from "../ui/Section";
 import { Check } from "../ui/fields";
+import { Bags } from "./Bags";
 import { StudyLeft } from "./Studies";
 
 /** Recordings that were dropped or chosen: imported, and the last of them opened. */
@@ -40,20 +42,27 @@ export function takeRecordings(files: readonly File[]): void {
     study.value = "flights";
     goTo("review");
   }
-  files.forEach((file) => void sendRecording(file, imported));
+  files.forEach((file) => void take(file));
 }
+
+/** A bag is asked about first. */
+const take = async (file: File) =>
+  (await isBag(file).catch(() => false)) ? sendBag(file) : sendRecording(file, imported);
 
 function Import({ isFirst }: { isFirst: boolean }) {
   return (
     <div class={`drop-zone ${isFirst ? "first" : ""}`} data-testid="recording-drop">
       {isFirst && (
-        <p>Drop a .mcap, .tlog, .bin or .ulg anywhere on this page. Flights are recorded by themselves.</p>
+        <p>
+          Drop a .mcap, .tlog, .bin, .ulg or ROS bag anywhere on this page. Flights are recorded by
+          themselves.
+        </p>
       )}
       <div class="row">
         <Button
           icon="import"
           testid="recording-import"
-          onClick={() => chooseFiles(".mcap,.tlog,.bin,.ulg", takeRecordings)}
+          onClick={() => chooseFiles(".mcap,.tlog,.bin,.ulg,.bag,.db3,.zip", takeRecordings)}
         >
           Open a recording…
         </Button>
@@ -247,6 +256,7 @@ function FlightsLeft() {
     <>
       <div class="panel-scroll">
         <Recordings />
+        <Bags />
         <Judge />
         <Maps />
       </div>

@@ -1,0 +1,1 @@
+"""Bags of ROS, brought in by pages."""
