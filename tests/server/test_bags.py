@@ -18,6 +18,7 @@ from server.flying.bags import bag_task
 from server.flying.bags.bag_desk import MOST_KEPT, BagDesk
 from server.schemas import BagDoc, BagRecordingBody
 from telemetry.errors import RecordingError
+from telemetry.recording.describe import describe_recording
 from telemetry.recording.flight_log import read_flight_log
 from tests.telemetry.bags import write_bag
 from tests.telemetry.test_ros_bags import Flight
@@ -88,6 +89,7 @@ def test_a_zipped_folder_is_listed_and_becomes_a_recording(tmp_path: Path, bags:
         asyncio.run(bag_desk.record(doc.id, BagRecordingBody(points="/points", home_alt_amsl_m=432.0)))
     assert [path.name for path in made] == ["run.mcap"]
     assert len(read_flight_log(made[0]).track.t_utc_s) == 28
+    assert describe_recording(made[0]).plan_name == "run"
     # Kept, for another sensor; a place that is declared counts before the bag's own.
     body = BagRecordingBody(
         points="/points", sensor="vision", home_lat_deg=10.0, home_lon_deg=20.0, home_alt_amsl_m=5.0

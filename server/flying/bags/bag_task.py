@@ -53,7 +53,13 @@ def make_recording(
 
     with named(bag, filename, kind=TelemetryError):
         flight = write_bag_flight(
-            bag, table, asked, sensor, out, progress=lambda share: report("Reading the bag", share)
+            bag,
+            table,
+            asked,
+            sensor,
+            out,
+            name=Path(filename).stem,
+            progress=lambda share: report("Reading the bag", share),
         )
         if not flight.is_on_earth:
             what = "Nothing tells where on Earth it was recorded: it holds no NavSatFix."

@@ -62,9 +62,19 @@ class BagFlight:
 
 
 def write_bag_flight(
-    path: Path, table: BagTable, asked: BagAsked, sensor: Sensor, out: Path, *, progress: Progress | None = None
+    path: Path,
+    table: BagTable,
+    asked: BagAsked,
+    sensor: Sensor,
+    out: Path,
+    *,
+    name: str = "",
+    progress: Progress | None = None,
 ) -> BagFlight:
-    """The bag as a recording ``out``. Raises RecordingError: what is missing, and what there is instead."""
+    """The bag as a recording ``out``, which calls itself ``name``, else as its file.
+
+    Raises RecordingError: what is missing, and what there is instead.
+    """
     if not (math.isfinite(asked.most_gap_s) and asked.most_gap_s > 0.0):
         raise RecordingError(f"A gap of {asked.most_gap_s:g} s is none.", where="--max-gap-s", advice="Try 0.5.")
     _check_topic(table, asked.points, POINT_TYPES, "points", path.name)
@@ -81,7 +91,7 @@ def write_bag_flight(
         home = _home(contents, bag, asked)
     except RecordingError as error:
         raise RecordingError(error.what, where=error.where or path.name, advice=error.advice) from error
-    return _write(bag, home, sensor, out, is_on_earth=home != _NOWHERE, fault=table.fault)
+    return _write(bag, home, sensor, out, name or out.stem, is_on_earth=home != _NOWHERE, fault=table.fault)
 
 
 def _check_topic(table: BagTable, name: str, types: frozenset[str], what: str, where: str) -> None:
@@ -140,13 +150,20 @@ def _home(contents: BagContents, bag: PlacedBag, asked: BagAsked) -> tuple[float
 
 
 def _write(
-    bag: PlacedBag, home: tuple[float, float, float], sensor: Sensor, out: Path, *, is_on_earth: bool, fault: str
+    bag: PlacedBag,
+    home: tuple[float, float, float],
+    sensor: Sensor,
+    out: Path,
+    name: str,
+    *,
+    is_on_earth: bool,
+    fault: str,
 ) -> BagFlight:
     start_ns = bag.clouds[0].stamp_ns
     bare = any(np.isnan(cloud.speed_m_s).any() or np.isnan(cloud.snr_db).any() for cloud in bag.clouds)
     settings = replace(WIDEST, paper_bare=bare)
     frame = LocalFrame(*home)
-    writer = RecordingWriter(out, t_utc_s=start_ns / 1e9, t_mono_s=start_ns / 1e9, name=out.stem, now=lambda: 0.0)
+    writer = RecordingWriter(out, t_utc_s=start_ns / 1e9, t_mono_s=start_ns / 1e9, name=name, now=lambda: 0.0)
     writer.write(Topic.PERCEPTION_SETTINGS, settings, start_ns / 1e9)
     for number, cloud in enumerate(bag.clouds):
         t_s = cloud.stamp_ns / 1e9

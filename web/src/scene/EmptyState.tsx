@@ -2,12 +2,11 @@ import { Button } from "../ui/Button";
 import { Changes } from "../ui/Changes";
 import { chooseFiles } from "../ui/choose_files";
 import { useDemo } from "../store/plans";
-import { sendTerrain } from "../store/files";
+import { MODEL_FILES, sendTerrain } from "../store/files";
 
 /** No terrain yet: what to do about it. */
 export function EmptyState() {
-  const choose = () =>
-    chooseFiles(".tif,.tiff,.asc,.txt", (files) => files.forEach((file) => void sendTerrain(file)));
+  const choose = () => chooseFiles(MODEL_FILES, (files) => files.forEach((file) => void sendTerrain(file)));
   return (
     <div class="empty-state" data-testid="empty-state">
       <svg class="empty-picture" viewBox="0 0 320 110" aria-hidden="true">
@@ -22,13 +21,13 @@ export function EmptyState() {
       </svg>
       <h2>Start with the ground</h2>
       <p>
-        Drop a GeoTIFF surface model here, or anywhere on this page. Hedgehop lays a safe surface over it and
-        plans paths that hug it.
+        Drop a GeoTIFF surface model or a point cloud here, or anywhere on this page. Hedgehop lays a safe
+        surface over it and plans paths that hug it.
       </p>
       <div class="row">
         <Changes>
           <Button kind="primary" icon="import" testid="empty-open" onClick={choose}>
-            Open a GeoTIFF…
+            Open a model…
           </Button>
           <Button icon="terrain" testid="empty-demo" onClick={() => void useDemo()}>
             Use the demo terrain
