@@ -1,10 +1,10 @@
 import { describe, expect, it } from "vitest";
 import { isBag, startsAsBag } from "../src/store/bags";
 
-const bytes = (text: string) => Uint8Array.from(text, (char) => char.charCodeAt(0));
+const bytes = (text: string): Uint8Array<ArrayBuffer> => Uint8Array.from(text, (char) => char.charCodeAt(0));
 
 /** The first record of an MCAP file. */
-function mcap(profile: string, library: string): Uint8Array {
+function mcap(profile: string, library: string): Uint8Array<ArrayBuffer> {
   const length = (text: string) => String.fromCharCode(text.length, 0, 0, 0);
   const body = length(profile) + profile + length(library) + library;
   return bytes(`\x89MCAP0\r\n\x01${String.fromCharCode(body.length, 0, 0, 0, 0, 0, 0, 0)}${body}`);
