@@ -1,5 +1,5 @@
 import { useState } from "preact/hooks";
-import { bytes, count, duration, number, parseNumber } from "../format";
+import { bytes, count, duration, number } from "../format";
 import type { BagDoc, BagRecordingBody, BagTopicDoc } from "../messages";
 import { BAGS, bags, making, putAway, recordBag } from "../store/bags";
 import { Button } from "../ui/Button";
@@ -27,6 +27,9 @@ const readable = (bag: BagDoc, ...roles: BagTopicDoc["role"][]) =>
 const option = ({ name, messages }: BagTopicDoc) => ({ value: name, label: `${name} (${number(messages)})` });
 
 const shortType = (type: string) => type.split("/").at(-1) ?? type;
+
+/** Of a field of numbers: its text is one, or empty. */
+const given = (text: string) => (text === "" ? null : Number(text));
 
 function Topics({ topics }: { topics: readonly BagTopicDoc[] }) {
   return (
@@ -91,15 +94,16 @@ function Ask({ bag }: { bag: BagDoc }) {
   const isBusy = making.value.has(bag.id);
   const submit = (event: Event) => {
     event.preventDefault();
+    if (draft.alt === "" || draft.gap === "") return; // the browser asks for both
     void recordBag(bag, {
       points: draft.points,
       pose: draft.pose || null,
       frame: draft.frame.trim() || null,
       sensor: draft.sensor,
-      max_gap_s: parseNumber(draft.gap) ?? 0.5,
-      home_lat_deg: parseNumber(draft.lat),
-      home_lon_deg: parseNumber(draft.lon),
-      home_alt_amsl_m: parseNumber(draft.alt) ?? 0,
+      max_gap_s: Number(draft.gap),
+      home_lat_deg: given(draft.lat),
+      home_lon_deg: given(draft.lon),
+      home_alt_amsl_m: Number(draft.alt),
     });
   };
   return (

@@ -26,7 +26,9 @@ function rows(): Row[] {
     share: job.progress,
     cancel: () => void cancelJob(job.id),
   }));
-  return [...uploads, ...running];
+  // What has been sent only waits for its answer: the job that works on it is shown before.
+  const isSent = ({ share }: Row) => share === 1;
+  return [...uploads.filter((row) => !isSent(row)), ...running, ...uploads.filter(isSent)];
 }
 
 /** What the server is busy with, in the status bar. */
