@@ -16,7 +16,6 @@ import numpy as np
 from telemetry.errors import RecordingError
 from telemetry.recording.ros.bag_reader import OpenBag, open_bag
 from telemetry.recording.ros.bag_types import (
-    FARTHEST_M,
     FIX,
     FRAME,
     LONGEST_NAME,
@@ -26,15 +25,14 @@ from telemetry.recording.ros.bag_types import (
     MOST_NAMES,
     MOST_POINTS,
     MOST_ROWS,
-    ODOMETRY,
     PLACE,
     POINT_TYPES,
-    POSE,
     TABLES,
     TF_TYPES,
     TRANSFORM,
 )
 from telemetry.recording.ros.point_messages import MalformedMessageError, points_of
+from telemetry.recording.ros.pose_messages import PoseFound, frame_name, pose_of, stamp_ns_of, transform_of
 
 Json = dict[str, Any]
 Send = Callable[..., None]
@@ -138,17 +136,11 @@ class _Sorter:
     def _sort(self, topic: str, kind: str, t_ns: int, message: Any) -> None:
         if kind in TF_TYPES:
             for each in message.transforms:
-                stamp, t = self._stamp(each.header, t_ns), each.transform.translation
-                self._transform(
-                    "transforms", stamp, each.header, each.child_frame_id, t, each.transform.rotation, topic
-                )
+                self._transform("transforms", self._stamp(each.header, t_ns), transform_of(each), topic)
         elif topic == self._points and kind in POINT_TYPES:
             self._frame(self._stamp(message.header, t_ns), message, kind)
         elif topic == self._pose:
-            pose = message.pose if kind == POSE else message.pose.pose
-            child = message.child_frame_id if kind == ODOMETRY else ""
-            stamp = self._stamp(message.header, t_ns)
-            self._transform("poses", stamp, message.header, child, pose.position, pose.orientation, topic)
+            self._transform("poses", self._stamp(message.header, t_ns), pose_of(message, kind), topic)
         elif kind == FIX and int(message.status.status) >= 0:
             place = (float(message.latitude), float(message.longitude), float(message.altitude))
             if abs(place[0]) > MOST_LAT_DEG or abs(place[1]) > MOST_LON_DEG:
@@ -164,23 +156,19 @@ class _Sorter:
         self._put("points", found, MOST_POINTS)
         self._put("frames", np.array([(stamp_ns, first, len(found), name)], FRAME))
 
-    def _transform(self, table: str, stamp_ns: int, header: Any, child: str, shift: Any, turn: Any, topic: str) -> None:
-        xyz, q = (shift.x, shift.y, shift.z), np.array((turn.w, turn.x, turn.y, turn.z), np.float64)
-        length = float(np.linalg.norm(q))
-        if not (all(abs(value) <= FARTHEST_M for value in xyz) and math.isfinite(length) and abs(length - 1.0) < 0.1):
-            raise MalformedMessageError(f"a transform to {child[:40]!r} is no rotation and shift")
-        parent, is_static = self._name(header.frame_id), topic.rstrip("/").endswith("tf_static")
-        number = self._name(child) if child else -1
-        self._put(table, np.array([(stamp_ns, parent, number, xyz, q / length, is_static)], TRANSFORM))
+    def _transform(self, table: str, stamp_ns: int, pose: PoseFound, topic: str) -> None:
+        parent, is_static = self._name(pose.parent), topic.rstrip("/").endswith("tf_static")
+        number = self._name(pose.child) if pose.child else -1
+        self._put(table, np.array([(stamp_ns, parent, number, pose.xyz_m, pose.q_wxyz, is_static)], TRANSFORM))
 
     def _stamp(self, header: Any, t_ns: int) -> int:
         """Of the header; when it was recorded for one that tells nothing."""
-        stamp_ns = int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)
+        stamp_ns = stamp_ns_of(header)
         self.counts["unstamped"] += stamp_ns == 0
         return stamp_ns or t_ns
 
     def _name(self, frame_id: str) -> int:
-        name = str(frame_id).lstrip("/")
+        name = frame_name(frame_id)
         if len(name) > LONGEST_NAME:
             raise MalformedMessageError("the name of its frame is absurdly long")
         if name not in self.names and len(self.names) >= MOST_NAMES:

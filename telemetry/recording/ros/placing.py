@@ -23,7 +23,7 @@ BASE_LINK = "base_link"
 MOST_GAP_S = 0.5
 _MOST_LISTED = 12
 _AROUND_NS = 50_000_000
-_FORWARD_LEFT_UP = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+FORWARD_LEFT_UP = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 """Right, forward, up of what REP 103 counts forward, left, up."""
 
 
@@ -189,8 +189,8 @@ def _clouds(
             continue
         points = contents.points[first : first + count]
         velocity = robot.velocity_m_s(stamp, most_gap_ns)
-        at = PlacedPose(stamp, pose.shift_m - origin_m, velocity, pose.R @ _FORWARD_LEFT_UP.T)
-        xyz_m = mount(points["xyz_m"]) @ _FORWARD_LEFT_UP.T
+        at = PlacedPose(stamp, pose.shift_m - origin_m, velocity, pose.R @ FORWARD_LEFT_UP.T)
+        xyz_m = mount(points["xyz_m"]) @ FORWARD_LEFT_UP.T
         yield PlacedCloud(stamp, xyz_m, points["speed_m_s"], points["snr_db"], at)
 
 
