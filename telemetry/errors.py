@@ -14,6 +14,8 @@ TelemetryError
 │   └── RecordingFullError     no space left to record on
 ├── SensorLinkError        an agent or ground station that does not speak the sensor link's protocol
 ├── SensorError            a sensor's port that is gone, busy or silent; a configuration that the sensor refuses
+├── Ros2Error              a router of ROS 2 that does not answer; topics or frames that are missing
+│   └── Ros2AddressError       a router that Hedgehop would not reach
 └── BusError               a node that is not there, or messages nobody understands
 """
 
@@ -78,6 +80,14 @@ class SensorLinkError(TelemetryError):
 
 class SensorError(TelemetryError):
     code = "sensor"
+
+
+class Ros2Error(TelemetryError):
+    code = "ros2"
+
+
+class Ros2AddressError(Ros2Error, AddressError):
+    code = "ros2_address"
 
 
 class BusError(TelemetryError):

@@ -1,0 +1,36 @@
+"""What has come and was not worked on yet: a callback puts, one thread takes, and who is slow loses the oldest."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Mapping
+
+from telemetry.ros2.wire import WireSample
+
+
+class Inbox:
+    """One row for each name. ``put`` never blocks; ``take`` empties rows by turns, so that none waits for ever."""
+
+    def __init__(self, most: Mapping[str, int]) -> None:
+        """``most``: how many wait under each name, those taken first standing first."""
+        self._rows: dict[str, deque[WireSample]] = {name: deque(maxlen=count) for name, count in most.items()}
+        self._ready = threading.Condition()
+        self.dropped = dict.fromkeys(most, 0)
+        """By name: that were not taken in time."""
+
+    def put(self, name: str, sample: WireSample) -> None:
+        with self._ready:
+            row = self._rows[name]
+            self.dropped[name] += len(row) == row.maxlen
+            row.append(sample)
+            self._ready.notify()
+
+    def take(self, timeout_s: float) -> tuple[str, WireSample] | None:
+        """The oldest of the first row that is not empty; None when nothing came in that time."""
+        with self._ready:
+            self._ready.wait_for(lambda: any(self._rows.values()), timeout_s)
+            for name, row in self._rows.items():
+                if row:
+                    return name, row.popleft()
+        return None
