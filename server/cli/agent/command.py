@@ -41,7 +41,7 @@ def agent(
     limit_kb_s: Annotated[float, Option(help="Bandwidth; clouds beyond it are left out.")] = 1000.0,
     as_json: Annotated[bool, Option("--json", help="Print what was sent as JSON at the end.")] = False,
 ) -> None:
-    """Send radar frames and point clouds to a ground station: from stdin, a radar on a port, or a recording."""
+    """Send radar frames and point clouds to a ground station: from stdin, a radar, topics of ROS 2, or a recording."""
     sensor_url(address)
     _check(voxel_m, limit_kb_s)
     made = Agent(
@@ -144,7 +144,7 @@ def _details(counts: AgentCounts, source: Source) -> Iterator[str]:
         yield f"refused by the ground station: {counts.report.refused}; the last: {counts.refused_why}"
     if counts.not_understood:
         yield f"not understood of the ground station's messages: {counts.not_understood}; is it of another version?"
-    yield from (str(status) for status in (source.radar, source.lines) if status is not None)
+    yield from (str(status) for status in (source.radar, source.lines, source.ros2) if status is not None)
 
 
 def _answer(counts: AgentCounts, source: Source, *, as_json: bool) -> None:
@@ -174,5 +174,5 @@ def _summary(counts: AgentCounts, report: ArrivalReport, source: Source) -> dict
         "points_not_finite": counts.points_not_finite,
         "points_out_of_reach": counts.points_out_of_reach,
     }
-    told = {"radar": source.radar, "lines": source.lines}
+    told = {"radar": source.radar, "lines": source.lines, "ros2": source.ros2}
     return summary | {name: status.as_dict() for name, status in told.items() if status is not None}

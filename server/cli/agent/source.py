@@ -5,12 +5,13 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
 from typer import Option
 
+from server.cli.agent.ros2_options import Ros2Options
 from server.cli.shared.output import say, say_notes
 from server.errors import BadRequestError
 from telemetry.agent.client import Reading
@@ -18,6 +19,8 @@ from telemetry.agent.driver_lines import DriverLines, LineCounts
 from telemetry.agent.live_radar import LiveStatus
 from telemetry.agent.position2go import BAUD as POSITION2GO_BAUD
 from telemetry.agent.position2go import Position2Go
+from telemetry.agent.ros2_source import Ros2Source
+from telemetry.agent.ros2_status import Ros2Status
 from telemetry.agent.sources import at, recorded_readings
 from telemetry.agent.ti_radar import TiRadar, TiStatus, captured_readings
 from telemetry.errors import SensorLinkError
@@ -46,6 +49,7 @@ class SourceOptions:
         None
     )
     position2go: Annotated[str | None, Option(metavar="PORT", help="Port of an Infineon Position2Go.")] = None
+    live: Ros2Options = field(default_factory=Ros2Options)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,12 +61,17 @@ class Source:
     """Of a radar that the agent itself reads, live or from a file."""
     lines: LineCounts | None = None
     """Of a driver on standard input."""
+    ros2: Ros2Status | None = None
+    """Of a robot's topics."""
 
 
 def source_of(options: SourceOptions) -> Source:
     """Raises DescribedError for options that do not go together and for a configuration that cannot be read, and
     OSError for a file that cannot be opened: before any ground station is asked for."""
     _check(options)
+    if options.live.ros2:
+        robot = Ros2Source(options.live.asked(), options.live.reach.address(), tell=say)
+        return Source(robot.readings(), ros2=robot.status)
     for file in (options.recording, options.ti_capture):
         if file is not None:
             file.open("rb").close()
@@ -89,10 +98,12 @@ def _check(options: SourceOptions) -> None:
         "--ti-data": options.ti_data,
         "--ti-capture": options.ti_capture,
         "--position2go": options.position2go,
+        "--ros2": options.live.ros2 or None,
     }
     given = [name for name, value in sources.items() if value is not None]
     if len(given) > 1:
         raise BadRequestError(f"{' and '.join(given)} are two sources.", advice="Give one of them.")
+    options.live.check()
     if options.ti_data is not None and options.ti_config is None:
         raise BadRequestError(
             "The radar's configuration is missing.", where="--ti-config", advice="Give the .cfg file that it is sent."
