@@ -82,6 +82,7 @@ class _Commands(_Lazy):
         "params": ("", ""),
         "logs": ("", ""),
         "radar": ("", ""),
+        "ros2": ("", ""),
         "account": ("", ""),
     }
 
@@ -112,6 +113,13 @@ class _LogsCommands(_Lazy):
     }
 
 
+class _Ros2Commands(_Lazy):
+    places: ClassVar = {
+        "topics": (".agent.ros2.topics_command.topics", examples.ROS2_TOPICS),
+        "publish": (".agent.ros2.publish_command.publish", examples.ROS2_PUBLISH),
+    }
+
+
 class _AccountCommands(_Lazy):
     places: ClassVar = {
         "add": (".account_command.add", examples.ACCOUNT_ADD),
@@ -134,7 +142,14 @@ params = typer.Typer(
 logs = typer.Typer(
     name="logs", help="Logs on the vehicle.", no_args_is_help=True, rich_markup_mode="rich", cls=_LogsCommands
 )
-_GROUPS = {"radar": radar, "account": account, "params": params, "logs": logs}
+ros2 = typer.Typer(
+    name="ros2",
+    help="A robot of ROS 2 by rmw_zenoh.",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    cls=_Ros2Commands,
+)
+_GROUPS = {"radar": radar, "ros2": ros2, "account": account, "params": params, "logs": logs}
 app = typer.Typer(
     name="hedgehop",
     help="Plan drone flights that hug the terrain, prove their clearance, fly and review them.",

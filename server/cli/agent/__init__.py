@@ -1,1 +1,1 @@
-"""``hedgehop agent``: a companion computer's sensors."""
+"""``hedgehop agent`` and ``hedgehop ros2``: sensors and robots that do not come by MAVLink."""

@@ -145,7 +145,17 @@ AGENT = _examples(
      "--token-file sensor-token.txt"),
     ("A recorded flight's frames once more", "hedgehop agent http://10.0.0.5:8000 --token-file sensor-token.txt "
      "--recording flight.mcap --json"),
+    ("A robot's lidar, by ROS 2", "hedgehop agent https://gcs.example --token-file sensor-token.txt --ros2 "
+     "--points /lidar/points --sensor vision --pose /odom"),
 )  # fmt: skip
+ROS2_TOPICS = _examples(
+    ("The robot on this machine", "hedgehop ros2 topics"),
+    ("Another one, for a script", "hedgehop ros2 topics --router 10.0.0.7 --domain 3 --json"),
+)
+ROS2_PUBLISH = _examples(
+    ("Beside a running station", "hedgehop ros2 publish"),
+    ("To a robot of humble elsewhere", "hedgehop ros2 publish --router 10.0.0.7 --domain 3 --humble"),
+)
 RADAR_PROCESS = _examples(
     ("A capture of TI's DCA1000 card", "hedgehop radar process adc_data_Raw_0.bin --cfg AWR1843config.cfg --plots "
      "figures"),

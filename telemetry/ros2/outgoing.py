@@ -1,0 +1,163 @@
+"""What Hedgehop knows, as messages of ROS 2: the vehicle's pose and fix, alerts, occupied voxels. Pure: no sockets.
+
+Frames: ``home`` (east, north, up of the first home that was told) and ``base_link`` (forward, left, up); a map that
+lies where nobody knows is told in ``map_NAME``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mapping.geometry.arrays import F64
+from mapping.geometry.frames import LocalFrame
+from telemetry.recording.mcap_files.foxglove import enu_from_body_quaternion
+from telemetry.recording.ros.bag_types import CLOUD, FIX, ODOMETRY, POSE
+from telemetry.recording.ros.ros2_export import BASE, HOME
+from telemetry.recording.ros.ros2_messages import DIAGNOSTICS, Ros2Messages
+from telemetry.topics.deltas import FoldedMap
+from telemetry.topics.messages import Published, Topic
+from telemetry.topics.obstacles import MapDelta, ObstacleAlert
+from telemetry.topics.vehicle import VehicleState
+
+STALE_S = 1.5
+"""An attitude this much older than its position is none."""
+LEVELS = {"begins": 2, "goes_on": 2, "ends": 0}
+"""Of diagnostic_msgs/DiagnosticStatus: ERROR while it stands, OK when it has ended."""
+MAPS = {Topic.MAP_RADAR: "radar", Topic.MAP_VISION: "vision", Topic.MAP_RANGES: "ranges"}
+
+
+@dataclass(frozen=True, slots=True)
+class OutTopic:
+    """Relative to the namespace."""
+
+    name: str
+    type: str
+    keeps: int
+    """So many last messages are handed to who comes late."""
+
+
+POSE_OUT, ODOM_OUT = OutTopic("pose", POSE, 0), OutTopic("odom", ODOMETRY, 0)
+FIX_OUT, ALERTS_OUT = OutTopic("fix", FIX, 0), OutTopic("alerts", DIAGNOSTICS, 10)
+VOXELS_OUT = {topic: OutTopic(f"voxels/{name}", CLOUD, 1) for topic, name in MAPS.items()}
+OUT_TOPICS = (POSE_OUT, ODOM_OUT, FIX_OUT, ALERTS_OUT, *VOXELS_OUT.values())
+
+
+class Outgoing:
+    """One station's messages, in turn."""
+
+    def __init__(self) -> None:
+        self._messages = Ros2Messages()
+        self._home: tuple[float, float, float] | None = None
+        self._position_s, self._maps = -math.inf, {topic: FoldedMap() for topic in MAPS}
+        self._changed = set[Topic]()
+        self.without_whole = set(MAPS)
+        """Maps of which the whole has to be asked for."""
+
+    def hash_of(self, kind: str) -> str:
+        return self._messages.hash_of(kind)
+
+    def of(
+        self, topic: str, message: Published, *, now_mono_s: float, now_utc_s: float
+    ) -> Iterator[tuple[OutTopic, bytes]]:
+        """What is told at once; maps wait for ``changed_maps``."""
+        shift_s = now_utc_s - now_mono_s
+        match message:
+            case VehicleState():
+                yield from self._vehicle(message, shift_s)
+            case ObstacleAlert():
+                yield ALERTS_OUT, self._alert(message)
+            case MapDelta() if topic in MAPS:
+                self._map(Topic(topic), message)
+            case _:
+                pass
+
+    def _map(self, topic: Topic, delta: MapDelta) -> None:
+        """Of a map that is not known from its beginning, or of which something was missed, nothing is told."""
+        last, begins = self._maps[topic].last, delta.whole and delta.part == 0
+        before = (delta.revision,) if delta.whole else (delta.since, delta.revision)
+        if begins:
+            self.without_whole.discard(topic)
+        elif last is None or last.revision not in before:
+            self.without_whole.add(topic)
+        if topic in self.without_whole:
+            return
+        self._maps[topic] = self._maps[topic].folded([delta])
+        if delta.part == delta.parts - 1:
+            self._changed.add(topic)
+
+    def changed_maps(self) -> list[tuple[OutTopic, FoldedMap]]:
+        """Since this was asked last; ``voxels`` makes their messages, in any thread."""
+        changed, self._changed = self._changed, set()
+        return [(VOXELS_OUT[topic], self._maps[topic]) for topic in sorted(changed)]
+
+    def voxels(self, folded: FoldedMap) -> bytes:
+        """Middles of the occupied voxels in the map's own frame, with their probability, known ground marked."""
+        last = folded.last
+        if last is None:
+            raise ValueError("There is no map yet.")
+        occupied = folded.voxels.occupied()
+        xyz_m = ((occupied.keys + 0.5) * last.resolution_m).astype(np.float32)
+        columns = {name: xyz_m[:, axis] for axis, name in enumerate("xyz")}
+        columns |= {
+            "probability": occupied.probability.astype(np.float32) / np.float32(255.0),
+            "known_ground": occupied.explained.astype(np.float32),
+        }
+        return self._messages.cloud(_ns(last.t_utc_s), f"map_{last.sensor}", columns)
+
+    def _vehicle(self, state: VehicleState, shift_s: float) -> Iterator[tuple[OutTopic, bytes]]:
+        """Each position once."""
+        t_s, lat_deg, lon_deg = state.position_t_mono_s, state.lat_deg, state.lon_deg
+        if t_s is None or lat_deg is None or lon_deg is None or t_s <= self._position_s:
+            return
+        self._position_s, stamp_ns = t_s, _ns(t_s + shift_s)
+        alt_m = math.nan if state.gnss_alt_ellipsoid_m is None else state.gnss_alt_ellipsoid_m
+        has_fix = state.gnss_fix not in ("none", "no_fix", "2d")
+        yield FIX_OUT, self._messages.fix(stamp_ns, BASE, (lat_deg, lon_deg, alt_m), has_fix=has_fix)
+        p_enu_m, q_wxyz = self._place(state), _attitude(state, t_s)
+        if p_enu_m is not None and q_wxyz is not None:
+            yield POSE_OUT, self._messages.pose(stamp_ns, HOME, p_enu_m, q_wxyz)
+            yield ODOM_OUT, self._messages.odometry(stamp_ns, HOME, BASE, p_enu_m, q_wxyz)
+
+    def _place(self, state: VehicleState) -> F64 | None:
+        """(3,) east, north, up of the first home, whatever home is later."""
+        home = (state.home_lat_deg, state.home_lon_deg, state.home_alt_amsl_m)
+        lat_deg, lon_deg, up_m = state.lat_deg, state.lon_deg, state.alt_rel_home_m
+        if lat_deg is None or lon_deg is None or up_m is None or home[0] is None or home[1] is None or home[2] is None:
+            return None
+        if self._home is None:
+            self._home = (home[0], home[1], home[2])
+        east, north, _ = LocalFrame(*self._home).to_enu(lat_deg, lon_deg, self._home[2])[0].tolist()
+        return np.array([east, north, up_m + home[2] - self._home[2]])
+
+    def _alert(self, alert: ObstacleAlert) -> bytes:
+        values = {"id": alert.id, "kind": alert.kind, "phase": alert.phase}
+        if (obstacle := alert.obstacle) is not None:
+            values |= {
+                "region": obstacle.region,
+                "distance_m": f"{obstacle.distance_m:.2f}",
+                "bearing_deg": f"{obstacle.bearing_deg:.1f}",
+                "height_difference_m": f"{obstacle.height_difference_m:.2f}",
+            }
+            if obstacle.time_to_contact_s is not None:
+                values["time_to_contact_s"] = f"{obstacle.time_to_contact_s:.2f}"
+            if obstacle.lat_deg is not None and obstacle.lon_deg is not None:
+                values |= {"lat_deg": f"{obstacle.lat_deg:.7f}", "lon_deg": f"{obstacle.lon_deg:.7f}"}
+        name, level = f"hedgehop: {alert.sensor}", LEVELS[alert.phase]
+        return self._messages.diagnostics(_ns(alert.t_utc_s), [(level, name, alert.text, alert.sensor, values)])
+
+
+def _attitude(state: VehicleState, t_s: float) -> F64 | None:
+    """w, x, y, z of forward, left, up in east, north, up; None where it is not known, or too old."""
+    roll, pitch, heading, attitude_t_s = state.roll_rad, state.pitch_rad, state.heading_rad, state.attitude_t_mono_s
+    if roll is None or pitch is None or heading is None or attitude_t_s is None or t_s - attitude_t_s > STALE_S:
+        return None
+    x, y, z, w = enu_from_body_quaternion(roll, pitch, heading)
+    return np.array((w, x, y, z))
+
+
+def _ns(t_utc_s: float) -> int:
+    return max(0, round(t_utc_s * 1e9))
