@@ -26,33 +26,33 @@ class Measured:
 
 
 class StampClock:
-    """One publisher's clock, laid over ours."""
+    """One publisher's clock, laid over our monotonic one: a step of our own clock of day changes nothing."""
 
     def __init__(self) -> None:
         self._shortest: deque[tuple[float, float]] = deque()
-        """(when received, offset), offsets rising: the first is the smallest of the window."""
-        self._published_s = -1.0
+        """(when received, monotonic time minus when published), the latter rising: the first is the smallest."""
+        self._published_s, self._mono_minus_utc_s = -1.0, 0.0
 
     @property
     def offset_s(self) -> float:
-        """Ours minus the publisher's; 0 before the first message."""
-        return self._shortest[0][1] if self._shortest else 0.0
+        """Our clock of day minus the publisher's; 0 before the first message."""
+        return self._shortest[0][1] - self._mono_minus_utc_s if self._shortest else 0.0
 
     def on_message(self, *, stamp_ns: int, source_ns: int, received_mono_s: float, received_utc_s: float) -> Measured:
         """``stamp_ns`` of its header, 0 for none; ``source_ns`` of its attachment."""
         source_s = source_ns / 1e9
         if source_s < self._published_s - _BACK_S:  # the publisher's clock was set back
             self._shortest.clear()
-        self._published_s = source_s
-        self._take(received_mono_s, received_utc_s - source_s)
+        self._published_s, self._mono_minus_utc_s = source_s, received_mono_s - received_utc_s
+        self._take(received_mono_s, received_mono_s - source_s)
         behind_s = (source_ns - stamp_ns) / 1e9 if stamp_ns else 0.0
         is_odd = not -MOST_AHEAD_S <= behind_s <= MOST_BEHIND_S
-        measured_utc_s = source_s + self.offset_s - (0.0 if is_odd else behind_s)
-        return Measured(received_mono_s - max(0.0, received_utc_s - measured_utc_s), is_odd)
+        t_mono_s = source_s + self._shortest[0][1] - (0.0 if is_odd else behind_s)
+        return Measured(min(received_mono_s, t_mono_s), is_odd)
 
-    def _take(self, received_mono_s: float, offset_s: float) -> None:
-        while self._shortest and self._shortest[-1][1] >= offset_s:
+    def _take(self, received_mono_s: float, mono_minus_source_s: float) -> None:
+        while self._shortest and self._shortest[-1][1] >= mono_minus_source_s:
             self._shortest.pop()
-        self._shortest.append((received_mono_s, offset_s))
+        self._shortest.append((received_mono_s, mono_minus_source_s))
         while self._shortest[0][0] < received_mono_s - WINDOW_S:
             self._shortest.popleft()

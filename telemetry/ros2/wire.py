@@ -34,6 +34,7 @@ _SETTINGS: dict[str, Any] = {
     "transport/shared_memory/enabled": False,
     "transport/link/protocols": ["tcp"],
     "transport/unicast/accept_timeout": 2000,
+    "transport/link/rx/max_message_size": 2 * MOST_BYTES,
     "adminspace/enabled": False,
     "connect/timeout_ms": 2000,
     "connect/exit_on_failure": True,

@@ -47,8 +47,9 @@ class Process:
         self._process.kill()
         self._process.wait(PATIENCE_S)
         for pipe in (self._process.stdin, self._process.stdout):
+            assert pipe is not None
             with contextlib.suppress(BrokenPipeError):
-                pipe and pipe.close()
+                pipe.close()
 
 
 @contextlib.contextmanager

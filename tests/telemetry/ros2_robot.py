@@ -112,6 +112,7 @@ class Robot:
             zenoh.ext.declare_advanced_publisher(
                 self.session,
                 key,
+                congestion_control=zenoh.CongestionControl.BLOCK,
                 cache=zenoh.ext.CacheConfig(max_samples=keeps) if keeps else None,
                 publisher_detection=True if keeps else None,
             ),
@@ -158,6 +159,8 @@ def obey(robot: Robot, order: dict[str, Any]) -> Any:
             robot.put(topic, odometry(**order))
         case "raw":
             robot.put(order["topic"], bytes.fromhex(order["payload"]))
+        case "zeros":
+            robot.put(order["topic"], bytes(order["count"]))
         case "listen":
             robot.listen(order["pattern"])
         case "heard":

@@ -138,6 +138,16 @@ def test_stamps_of_another_clock_count_as_published() -> None:
         assert found.t_mono_s == pytest.approx(7.0)
 
 
+def test_our_own_clock_of_day_may_step() -> None:
+    clock = StampClock()
+    for second, step_s in ((0, 0.0), (1, 3600.0), (2, -3600.0)):
+        found = clock.on_message(
+            stamp_ns=0, source_ns=10**15 + second * 10**9, received_mono_s=second, received_utc_s=1e6 + second + step_s
+        )
+        assert found.t_mono_s == pytest.approx(second, abs=1e-5)
+        assert clock.offset_s == pytest.approx(step_s, abs=1e-5)
+
+
 def test_a_clock_that_is_set_back_is_learnt_anew() -> None:
     clock = StampClock()
     clock.on_message(stamp_ns=0, source_ns=10**15, received_mono_s=1.0, received_utc_s=1e6)

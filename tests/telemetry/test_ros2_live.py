@@ -16,6 +16,7 @@ from telemetry.agent.link_messages import Slam
 from telemetry.agent.ros2_source import ROWS, Ros2Asked
 from telemetry.ros2.address import zenoh_address
 from telemetry.ros2.listener import Ros2Listener
+from telemetry.ros2.wire import MOST_BYTES
 from tests.telemetry.ros2_bench import Process, free_port, process, reading, wait_for
 from tests.telemetry.ros2_robot import CLOUD, GID, ODOM, TF, cloud, transforms
 
@@ -66,6 +67,20 @@ def test_a_radars_targets_come_through_the_frames_of_the_robot(robot: Process, p
         send_until(robot, lambda: any(not len(each.targets) for each in reader.of(RadarReading)), points=[])
         status = reader.source.status.as_dict()
         assert status["left_out"] == status["refused"] == status["unplaced"] == {}
+        reader.wait_told("/radar/points: no message for 2 s")
+        send_until(robot, lambda: any("messages come again" in each for each in reader.told))
+
+
+def test_a_peer_that_went_is_met_again(port: int) -> None:
+    with process(port, "peer") as first, reading(RADAR, port) as reader:
+        mount(first)
+        send_until(first, lambda: reader.of(RadarReading))
+        first.kill()
+        reader.wait_told("is gone")
+        with process(port, "peer") as second:
+            mount(second)
+            before = len(reader.of(RadarReading))
+            send_until(second, lambda: len(reader.of(RadarReading)) > before)
 
 
 def test_a_lidar_and_its_pose_by_a_router(port: int) -> None:
@@ -171,6 +186,17 @@ def test_a_thousand_mutants_are_counted_and_harm_nothing(robot: Process, port: i
         send_until(robot, lambda: len(reader.of(RadarReading)) > before)
         assert known() >= sent
         assert sum(dict(seen.listener.refused).values()) > 100
+
+
+def test_what_is_too_large_is_counted_and_not_read(robot: Process, port: int) -> None:
+    mount(robot)
+    with reading(RADAR, port) as reader:
+        send_until(robot, lambda: reader.of(RadarReading))
+        robot.do("zeros", topic="/radar/points", count=MOST_BYTES + 1)
+        reader.wait_told("larger than 32 MB")
+        robot.do("zeros", topic="/radar/points", count=4 * MOST_BYTES)
+        before = len(reader.of(RadarReading))
+        send_until(robot, lambda: len(reader.of(RadarReading)) > before)
 
 
 def test_a_slow_reader_keeps_the_newest_and_counts_the_rest(robot: Process, port: int) -> None:
