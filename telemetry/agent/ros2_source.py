@@ -58,7 +58,6 @@ class Ros2Asked:
 
     @property
     def rows(self) -> dict[str, int]:
-        """Transforms first: a frame that is looked at before them would wait."""
         rows = {TF_STATIC_TOPIC: ROWS[TF_STATIC_TOPIC], TF_TOPIC: ROWS[TF_TOPIC]}
         if self.pose is not None:
             rows.setdefault(self.pose, ROWS["pose"])

@@ -13,9 +13,9 @@ class Inbox:
     """One row for each name. ``put`` never blocks; ``take`` empties rows by turns, so that none waits for ever."""
 
     def __init__(self, most: Mapping[str, int]) -> None:
-        """``most``: how many wait under each name, those taken first standing first."""
+        """``most``: how many wait under each name."""
         self._rows: dict[str, deque[WireSample]] = {name: deque(maxlen=count) for name, count in most.items()}
-        self._ready = threading.Condition()
+        self._ready, self._next = threading.Condition(), 0
         self.dropped = dict.fromkeys(most, 0)
         """By name: that were not taken in time."""
 
@@ -27,10 +27,13 @@ class Inbox:
             self._ready.notify()
 
     def take(self, timeout_s: float) -> tuple[str, WireSample] | None:
-        """The oldest of the first row that is not empty; None when nothing came in that time."""
+        """The oldest of the next row that is not empty; None when nothing came in that time."""
         with self._ready:
             self._ready.wait_for(lambda: any(self._rows.values()), timeout_s)
-            for name, row in self._rows.items():
-                if row:
+            names = list(self._rows)
+            for place in range(self._next, self._next + len(names)):
+                name = names[place % len(names)]
+                if row := self._rows[name]:
+                    self._next = place % len(names) + 1
                     return name, row.popleft()
         return None

@@ -16,7 +16,7 @@ from telemetry.agent.client import Reading
 from telemetry.agent.ros2_source import Ros2Asked, Ros2Source
 from telemetry.ros2.address import zenoh_address
 
-PATIENCE_S = 30.0
+PATIENCE_S = 60.0
 
 
 def free_port() -> int:

@@ -183,6 +183,11 @@ def test_who_is_slow_loses_the_oldest_and_nobody_waits() -> None:
     taken = [inbox.take(0.0) for _ in range(4)]
     assert [(row, sample.key) for row, sample in filter(None, taken)] == [("tf", "0"), ("points", "3"), ("points", "4")]
     assert inbox.dropped == {"tf": 0, "points": 3}
+    for _ in range(2):
+        inbox.put("tf", samples[0])
+        inbox.put("points", samples[1])
+    turns = [inbox.take(0.0) for _ in range(4)]
+    assert {row for row, _ in filter(None, turns[:2])} == {"tf", "points"}  # a flood of one does not starve the other
     waiting = threading.Timer(0.05, inbox.put, ("tf", samples[1]))
     waiting.start()
     assert inbox.take(30.0) == ("tf", samples[1])

@@ -96,6 +96,8 @@ async def _run(made: Agent, source: Source) -> None:
     finally:
         for task in (connection, teller):
             task.cancel()
+        if source.close is not None:
+            await asyncio.to_thread(source.close)
         with contextlib.suppress(asyncio.CancelledError):
             await connection
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -63,6 +63,8 @@ class Source:
     """Of a driver on standard input."""
     ros2: Ros2Status | None = None
     """Of a robot's topics."""
+    close: Callable[[], None] | None = None
+    """Ends what ``readings`` has opened, from any thread; None: it ends with the process."""
 
 
 def source_of(options: SourceOptions) -> Source:
@@ -71,7 +73,7 @@ def source_of(options: SourceOptions) -> Source:
     _check(options)
     if options.live.ros2:
         robot = Ros2Source(options.live.asked(), options.live.reach.address(), tell=say)
-        return Source(robot.readings(), ros2=robot.status)
+        return Source(robot.readings(), ros2=robot.status, close=robot.close)
     for file in (options.recording, options.ti_capture):
         if file is not None:
             file.open("rb").close()
