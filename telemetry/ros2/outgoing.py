@@ -53,7 +53,8 @@ class Outgoing:
         self._messages = Ros2Messages()
         self._home: tuple[float, float, float] | None = None
         self._position_s, self._maps = -math.inf, {topic: FoldedMap() for topic in MAPS}
-        self._changed = set[Topic]()
+        self._deltas: dict[Topic, list[MapDelta]] = {topic: [] for topic in MAPS}
+        self._revisions: dict[Topic, int] = {}
         self.without_whole = set(MAPS)
         """Maps of which the whole has to be asked for."""
 
@@ -77,29 +78,29 @@ class Outgoing:
 
     def _map(self, topic: Topic, delta: MapDelta) -> None:
         """Of a map that is not known from its beginning, or of which something was missed, nothing is told."""
-        last, begins = self._maps[topic].last, delta.whole and delta.part == 0
         before = (delta.revision,) if delta.whole else (delta.since, delta.revision)
-        if begins:
+        if delta.whole and delta.part == 0:
             self.without_whole.discard(topic)
-        elif last is None or last.revision not in before:
+        elif self._revisions.get(topic) not in before:
             self.without_whole.add(topic)
         if topic in self.without_whole:
+            self._deltas[topic].clear()
             return
-        self._maps[topic] = self._maps[topic].folded([delta])
-        if delta.part == delta.parts - 1:
-            self._changed.add(topic)
+        self._revisions[topic] = delta.revision
+        self._deltas[topic].append(delta)
 
-    def changed_maps(self) -> list[tuple[OutTopic, FoldedMap]]:
-        """Since this was asked last; ``voxels`` makes their messages, in any thread."""
-        changed, self._changed = self._changed, set()
-        return [(VOXELS_OUT[topic], self._maps[topic]) for topic in sorted(changed)]
+    def changed_maps(self) -> Iterator[tuple[Topic, list[MapDelta]]]:
+        """What has come since this was asked last; hand it to ``voxels``."""
+        for topic, deltas in self._deltas.items():
+            if deltas and deltas[-1].part == deltas[-1].parts - 1:
+                self._deltas[topic] = []
+                yield topic, deltas
 
-    def voxels(self, folded: FoldedMap) -> bytes:
-        """Middles of the occupied voxels in the map's own frame, with their probability, known ground marked."""
-        last = folded.last
-        if last is None:
-            raise ValueError("There is no map yet.")
-        occupied = folded.voxels.occupied()
+    def voxels(self, topic: Topic, deltas: list[MapDelta]) -> bytes:
+        """The map with these: middles of the occupied voxels in its own frame, with their probability, known ground
+        marked. Takes its time: not for an event loop, and for each topic one at a time."""
+        self._maps[topic] = folded = self._maps[topic].folded(deltas)
+        last, occupied = deltas[-1], folded.voxels.occupied()
         xyz_m = ((occupied.keys + 0.5) * last.resolution_m).astype(np.float32)
         columns = {name: xyz_m[:, axis] for axis, name in enumerate("xyz")}
         columns |= {

@@ -11,7 +11,7 @@ from telemetry.bus.bus import Bus
 from telemetry.bus.subscription import Subscription
 from telemetry.errors import BusError
 from telemetry.ros2 import grammar
-from telemetry.ros2.outgoing import MAPS, OUT_TOPICS, Outgoing, OutTopic
+from telemetry.ros2.outgoing import MAPS, OUT_TOPICS, VOXELS_OUT, Outgoing, OutTopic
 from telemetry.ros2.wire import Ros2Publisher, Ros2Wire
 from telemetry.topics.messages import Topic
 from telemetry.topics.requests import WholeMap
@@ -79,8 +79,8 @@ class Ros2Teller:
                 with contextlib.suppress(BusError):  # that sensor's node does not run
                     await bus.call(MAPS[topic], WholeMap(), result=type(None), timeout_s=ASK_S, appears_s=0.0)
             await asyncio.sleep(MAPS_EVERY_S)
-            for out, folded in self._outgoing.changed_maps():
-                self._put(out, await asyncio.to_thread(self._outgoing.voxels, folded))
+            for topic, deltas in list(self._outgoing.changed_maps()):
+                self._put(VOXELS_OUT[topic], await asyncio.to_thread(self._outgoing.voxels, topic, deltas))
 
     def _put(self, out: OutTopic, payload: bytes) -> None:
         self._topics[out].put(payload)
