@@ -18,8 +18,7 @@ from server.door.tls import Tls
 from server.errors import ServerError, StartError
 from server.fleet import Fleet
 from server.library import Library
-from server.settings import Settings
-from server.stations import RUNTIME_FOLDER
+from server.settings import RUNTIME_FOLDER, Settings
 from server.web import create_app
 from server.work.guarded import Guarded
 from server.work.logs import configure_logging

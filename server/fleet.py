@@ -26,8 +26,8 @@ from server.obstacles.replayed import Replayed
 from server.scene.layers.vehicles import actor_of
 from server.schemas import FleetMessage, ServerMessage
 from server.schemas.station_docs import FIRST_VEHICLE
-from server.settings import Settings
-from server.stations import RUNTIME_FOLDER, Flying, Shared, VehicleWanted
+from server.settings import RUNTIME_FOLDER, Settings
+from server.stations import Flying, Shared, VehicleWanted
 from server.studies.scenario_desk import ScenarioDesk
 from server.traversability.live_uwb import LiveUwb
 from server.work.jobs import Lane

@@ -67,6 +67,10 @@ Vehicles = Annotated[
 ]
 
 
+RUNTIME_FOLDER = "run"
+"""Of the data directory, and of each vehicle's: the sockets of its nodes."""
+
+
 def default_data_dir() -> Path:
     """The user's data home, by the XDG rule."""
     home = os.environ.get("XDG_DATA_HOME", "")

@@ -41,7 +41,7 @@ from server.obstacles.obstacles import Obstacles
 from server.obstacles.replayed import Replayed
 from server.schemas import LinkMessage, NoticeMessage, ServerMessage, TransferMessage, VehicleAlarm, VehicleDoc
 from server.schemas.station_docs import FIRST_VEHICLE
-from server.settings import DemoAutopilot
+from server.settings import RUNTIME_FOLDER, DemoAutopilot
 from server.studies.scenario_desk import ScenarioDesk
 from server.work.jobs import Lane
 from server.workspace import Workspace
@@ -53,7 +53,6 @@ from telemetry.topics.vehicle import RadarKind, VehicleState
 
 log = logging.getLogger("hedgehop.flying")
 
-RUNTIME_FOLDER = "run"
 ALIVE_EVERY_S = 1.0
 APART_M = 15.0
 """From one of the demo's vehicles to the next."""

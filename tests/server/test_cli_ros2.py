@@ -16,7 +16,7 @@ import pytest
 
 from mapping.sensor_frames import RadarFrame
 from server.door.sensor_token import sensor_token
-from server.stations import RUNTIME_FOLDER
+from server.settings import RUNTIME_FOLDER
 from telemetry.bus.bus import Bus
 from telemetry.topics.messages import Topic
 from tests.server.cli_runs import hedgehop
@@ -96,6 +96,7 @@ def test_a_robots_radar_reaches_the_ground_station(tmp_path: Path) -> None:
         finally:
             agent.send_signal(signal.SIGINT)
             out, err = agent.communicate(timeout=PATIENCE_S)
+        assert agent.returncode == 0, err
         xyz_m, speed_m_s, snr_db = frame.columns()
         assert xyz_m == pytest.approx(np.array([[0.0, 40.0, 1.0]]))
         assert (speed_m_s[0], snr_db[0]) == (0.5, 25.0)
@@ -129,4 +130,5 @@ async def _published(robot: Any, port: int, folder: Path) -> tuple[list[Any], di
         finally:
             program.send_signal(signal.SIGINT)
             out, _ = await program.communicate()
+        assert program.returncode == 0
     return poses, json.loads(out)["told"]

@@ -18,7 +18,7 @@ from planning.terrain.geotiff import write_dsm
 from server.door.sensor_token import sensor_token
 from server.library import Library
 from server.schemas import TraversabilityState, UwbLiveDoc
-from server.stations import RUNTIME_FOLDER
+from server.settings import RUNTIME_FOLDER
 from server.traversability.live_uwb import AGAIN_S, SILENT_S, LiveUwb
 from telemetry.agent.client import Agent
 from telemetry.agent.link_messages import Uwb

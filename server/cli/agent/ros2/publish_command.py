@@ -16,8 +16,7 @@ from server.cli.shared.command import command
 from server.cli.shared.output import answer, say
 from server.cli.shared.ros2_options import Ros2Reach
 from server.errors import NotFoundError
-from server.settings import default_data_dir
-from server.stations import RUNTIME_FOLDER
+from server.settings import RUNTIME_FOLDER, default_data_dir
 from telemetry.bus.bus import Bus
 from telemetry.ros2.address import ZenohAddress
 from telemetry.ros2.grammar import topic_name
