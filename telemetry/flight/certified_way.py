@@ -45,6 +45,8 @@ class Flown:
     fence: Fence = NO_FENCE
     """On board, and the plan's where there is one."""
     rally: tuple[RallyPoint, ...] = ()
+    home_off_m: float = 0.0
+    """So much above the ground home may lie, or below it: ``telemetry.flight.home_height``."""
 
 
 def here_of(state: VehicleState, wish: Wish, now_s: float) -> Here:
@@ -130,7 +132,7 @@ def demanded(state: VehicleState, flown: Flown) -> ClearanceParams:
     row = gnss_row(state, flown.profile)
     if row.state in ("bad", "unknown"):
         raise NotAllowedError(row.text, advice=row.mend)
-    clearance = flown.clearance
+    clearance = _at_worse_end(flown)
     height_m = return_settings(flown.parameters, _firmware(state)).height_m
     worse_m = max(0.0, max(accuracy_m(state)[:2]) - clearance.position_error_m)
     return replace(
@@ -139,6 +141,18 @@ def demanded(state: VehicleState, flown: Flown) -> ClearanceParams:
         position_error_m=clearance.position_error_m + worse_m,
         rtl_height_m=clearance.rtl_height_m if height_m is None else height_m,
         set_down_m=0.0,
+    )
+
+
+def _at_worse_end(flown: Flown) -> ClearanceParams:
+    """The vehicle may be lower than it tells, and higher: then a fence's ceiling is nearer, and the highest height."""
+    clearance, off_m = flown.clearance, flown.home_off_m
+    most_m = clearance.max_height_above_ground_m
+    return replace(
+        clearance,
+        required_clearance_m=clearance.required_clearance_m + abs(off_m),
+        position_error_m=clearance.position_error_m + (max(0.0, off_m) if flown.fence else 0.0),
+        max_height_above_ground_m=None if most_m is None else most_m - max(0.0, off_m),
     )
 
 

@@ -43,11 +43,21 @@ def home_of_takeoff(states: Sequence[VehicleState]) -> HomePlace | None:
     return next((home for state in flown if (home := home_of(state)) is not None), None)
 
 
+def is_there(home: HomePlace | None, wanted: HomePlace) -> bool:
+    """Within what home wanders by itself."""
+    return home is not None and moved_words(wanted, home) is None
+
+
 class HomeWatch:
     """Of one flight after the other."""
 
     def __init__(self) -> None:
         self._home: HomePlace | None = None
+        self._ordered: HomePlace | None = None
+
+    def expect(self, ordered: HomePlace | None) -> None:
+        """Home that comes there moves by our own order; None: nothing is ordered."""
+        self._ordered = ordered
 
     def on_state(self, state: VehicleState) -> str | None:
         """What is to be said at once, each time that home has moved since it was last said."""
@@ -57,6 +67,9 @@ class HomeWatch:
         home = home_of(state)
         if home is None or self._home is None:
             self._home = home or self._home
+            return None
+        if self._ordered is not None and is_there(home, self._ordered):
+            self._home = home
             return None
         words = moved_words(self._home, home)
         if words is not None:

@@ -100,6 +100,7 @@ class Answering:
             requests.StartGuided: self._start_guided,
             requests.FlyWay: self._fly_way,
             requests.SetSpeed: self._set_speed,
+            requests.SetHome: self._set_home,
             requests.SetAvoidance: self._set_avoidance,
             requests.FlyManoeuvre: self._fly_manoeuvre,
             requests.MayFlyManoeuvre: self._may_fly_manoeuvre,
@@ -276,6 +277,12 @@ class Answering:
         pilot = self._link.need_session().pilot
         await self._record(request, f"change the speed to {request.speed_m_s:g} m/s")
         await pilot.set_speed(request)
+
+    async def _set_home(self, request: requests.SetHome) -> None:
+        session = self._link.need_session()
+        at = f"{request.lat_deg:.7f}, {request.lon_deg:.7f}, {request.alt_amsl_m:.1f} m above the sea"
+        await self._record(request, f"set home to {at}")
+        await session.set_home(request)
 
     async def _fly_manoeuvre(self, request: requests.FlyManoeuvre) -> None:
         pilot = self._link.need_session().pilot

@@ -48,6 +48,12 @@ UNKNOWN_MISSION = "unknown"
 """No digest is this."""
 OTHER_PLACES = "other places"
 """No digest is this: the mission was started with another fence, or other rally points."""
+OTHER_HOME = "another home"
+"""No digest is this: home was set elsewhere since, from where its heights count."""
+HOME_MOVED = (
+    "The mission on board was certified for the home before: its heights count from the new one. The vehicle holds."
+    " Certify the rest from here (Fly, On board), return home, or land."
+)
 FOREIGN_MISSION = (
     "The mission on board is not the one that was started any more: another ground station has written to it."
     " The vehicle holds. Return home or land."
@@ -201,6 +207,10 @@ class UnderWay:
         """Fence or rally points are: the mission on board was not certified with those that come."""
         self.started, self._is_inherited = Started(OTHER_PLACES, replaced_here=True), False
 
+    def moves_home(self) -> None:
+        """The mission on board was not certified for the home that comes."""
+        self.begin(OTHER_HOME)
+
     def on_state(self, state: VehicleState) -> None:
         if _flies_mission(state) and self.started.begins is not None:
             self.started = replace(self.started, begins=None)
@@ -217,6 +227,9 @@ class UnderWay:
         if self.started.digest == OTHER_PLACES:
             what = "The mission on board is not certified with the fence and rally points that were sent since."
             raise NotAllowedError(what, advice="Take the plan up again, return home, or land.")
+        if self.started.digest == OTHER_HOME:
+            what = "The mission on board was certified for the home before: its heights count from the new one."
+            raise NotAllowedError(what, advice="Certify the rest from here (Fly, On board), return home, or land.")
         if self.started.digest is not None:
             check_same_mission(self._onboard, self.started.digest)
         if self.started.begins is not None:
@@ -224,7 +237,9 @@ class UnderWay:
 
     @property
     def why_foreign(self) -> str:
-        """Whose the mission is that is not the one that was started."""
+        """What is said of a mission that ``turns_foreign``: whose it is, or why it does not hold any more."""
+        if self.started.digest == OTHER_HOME:
+            return HOME_MOVED
         is_ours = self.started.replaced_here and not self._onboard.is_written_by_others
         return NOT_TAKEN_UP if is_ours else FOREIGN_MISSION
 

@@ -292,6 +292,13 @@ class Pilot:
         onboard = self.vehicle.onboard.mission
         self.flight.replaced(len(onboard.items) if onboard else 0, time.time())
 
+    def moves_home(self) -> None:
+        """Raises NotAllowedError unless it holds in the air. What is paused is not gone on with from another home."""
+        self.check_holds()
+        self._end_current()
+        self.join = None
+        self._under_way.moves_home()
+
     async def return_home(self) -> None:
         await self._change_mode("RTL")
 

@@ -15,7 +15,8 @@ from dataclasses import dataclass
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import SilentError, TelemetryError
-from telemetry.flight.home_watch import HomeWatch
+from telemetry.flight.guided.beginning import check_stands_there
+from telemetry.flight.home_watch import HomePlace, HomeWatch, home_of, is_there
 from telemetry.link.adopted import ALERT, WARNING, AdoptedVehicle, Telling
 from telemetry.link.audit import AUTOPILOT, CommandLog
 from telemetry.link.line import Line
@@ -27,11 +28,13 @@ from telemetry.link.publishing import StatePublisher
 from telemetry.link.signatures import KeyRing
 from telemetry.link.transferring import Transfers
 from telemetry.mavlink.actions import Message
+from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import FlightKeeper
 from telemetry.mavlink.ranges import RangeReader
 from telemetry.mavlink.signing import KEY_BYTES
 from telemetry.topics.messages import Candidate, Published, RawFrame, Topic, VehicleText
 from telemetry.topics.obstacles import AvoidBy, PerceptionSettings
+from telemetry.topics.requests import SetHome
 from telemetry.topics.traffic import TrafficSettings
 from telemetry.topics.vehicle import VehicleState
 from telemetry.traffic.picture import TrafficPicture
@@ -42,6 +45,8 @@ OTHER_VEHICLE = (
     f"asked again after {REFUSED_S:.0f} s."
 )
 READ_BACK_AFTER_S = (0.0, 5.0, 15.0)
+HOME_SHOWS_S = 6.0
+"""Vehicles tell their home every two seconds, or when it changes."""
 AVOIDS_AGAIN = (
     "The link has restarted: nothing avoided obstacles meanwhile. Avoidance is on again. Look where the vehicle is."
 )
@@ -204,6 +209,24 @@ class Session:
         what = "The vehicle was given a key, and has not begun to sign with it."
         advice = "It may not know signing, or refuse it on this link: PX4 needs MAV_SIGN_CFG. Read its messages."
         raise SilentError(what, advice=advice)
+
+    async def set_home(self, request: SetHome) -> None:
+        """Raises NotAllowedError, RefusedError, and SilentError where the vehicle does not tell that home."""
+        vehicle, wanted = self.vehicle, HomePlace(request.lat_deg, request.lon_deg, request.alt_amsl_m)
+        if is_in_the_air(vehicle.state):
+            self.pilot.moves_home()
+        else:
+            check_stands_there(vehicle.state, wanted, time.monotonic())
+        self._home.expect(wanted)
+        try:
+            await vehicle.obey(vehicle.orders.set_home(wanted.lat_deg, wanted.lon_deg, wanted.alt_amsl_m))
+            await vehicle.wait_until(
+                lambda state: is_there(home_of(state), wanted),
+                timeout_s=HOME_SHOWS_S,
+                what="tell the home that was set",
+            )
+        finally:
+            self._home.expect(None)
 
     def _give_key(self, key: bytes, timestamp: int) -> None:
         """Never through ``on_sent``: a recording must not hold the key."""

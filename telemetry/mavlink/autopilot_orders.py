@@ -92,6 +92,24 @@ class Orders:
         )
         return Order(message)
 
+    def set_home(self, lat_deg: float, lon_deg: float, alt_amsl_m: float) -> Order:
+        """With its height: where home is set without, both autopilots take the vehicle's own, also in the air."""
+        message = mavlink.MAVLink_command_int_message(
+            *self.target,
+            mavlink.MAV_FRAME_GLOBAL,
+            mavlink.MAV_CMD_DO_SET_HOME,
+            0,
+            0,
+            0,
+            math.nan,
+            math.nan,
+            math.nan,
+            round(lat_deg * 1e7),
+            round(lon_deg * 1e7),
+            alt_amsl_m,
+        )
+        return Order(message)
+
     def change_speed(self, kind: int, speed_m_s: float) -> Order:
         """``kind``: SPEED_TYPE. Holds until the next change of the flight mode."""
         return Order(self._long(mavlink.MAV_CMD_DO_CHANGE_SPEED, kind, speed_m_s, ANY_THROTTLE))

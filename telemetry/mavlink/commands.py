@@ -21,6 +21,7 @@ _COMMANDS: dict[int, str] = {
     MavCmd.CONDITION_YAW: "turn to a heading",
     MavCmd.DO_SET_MODE: "change the flight mode",
     MavCmd.DO_CHANGE_SPEED: "change the speed",
+    MavCmd.DO_SET_HOME: "set home",
     MavCmd.DO_REPOSITION: "fly to a place",
     MavCmd.DO_PAUSE_CONTINUE: "pause or go on",
     MavCmd.DO_SET_ROI_LOCATION: "look at a place",

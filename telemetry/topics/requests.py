@@ -1,42 +1,23 @@
 """What may be asked of the link and of perception, and by whom. All are frozen dataclasses.
 
-``Operator.token`` is the fencing token of the server's lease: the link node refuses every request that changes
-anything on a vehicle when its token is lower than the highest one it has seen. Tokens count milliseconds since 1970, so
-that none can be far ahead of the clock: one that is would shut out all that come after it, and is refused.
+The link node refuses every request that changes anything on a vehicle when its operator's token is lower than the
+highest one it has seen.
 """
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from typing import Literal
 
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.obstacles import AvoidBy
 from telemetry.topics.onboard_lists import Item, PlaceList
+from telemetry.topics.operators import Operator as Operator
+from telemetry.topics.operators import OperatorRequest
+from telemetry.topics.operators import highest_possible_token as highest_possible_token
 from telemetry.topics.parameters import ParameterChange
 
-TOKEN_AHEAD_MS = 24 * 3600 * 1000
-"""A clock may be set back by so much without anything being noticed of it."""
-
-
-def highest_possible_token(now_utc_s: float | None = None) -> int:
-    """For whoever issues tokens and whoever checks them, both by the clock of this machine."""
-    return int(1000 * (time.time() if now_utc_s is None else now_utc_s)) + TOKEN_AHEAD_MS
-
-
-@dataclass(frozen=True, slots=True)
-class Operator:
-    name: str
-    token: int
-
-
 # To the link node. What it answers stands behind the arrow; errors come back as DescribedError.
-
-
-@dataclass(frozen=True, slots=True)
-class OperatorRequest:
-    operator: Operator
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,6 +279,19 @@ class Land(OperatorRequest):
 
 
 @dataclass(frozen=True, slots=True)
+class SetHome(OperatorRequest):
+    """Where the vehicle returns to and its heights begin. -> None, once the vehicle tells that home; SilentError
+
+    In the air only where it holds; on the ground only where it stands.
+    """
+
+    lat_deg: float
+    lon_deg: float
+    alt_amsl_m: float
+    """By the vehicle's own heights above the sea."""
+
+
+@dataclass(frozen=True, slots=True)
 class SetAvoidance(OperatorRequest):
     """Switches avoiding obstacles by itself on or off, and says how.
 
@@ -381,6 +375,7 @@ LinkRequest = (
     | Resume
     | ReturnHome
     | Land
+    | SetHome
     | SetAvoidance
     | FlyManoeuvre
     | MayFlyManoeuvre

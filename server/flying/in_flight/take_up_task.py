@@ -80,8 +80,9 @@ def make_take_up(asked: AskedTakeUp, *, report: Progress) -> MadeTakeUp:
     flown_items = 0 if asked.before is None else _flown_items(asked.before, planned, asked.next_item)
     sent = _sent(asked, planned.firmware)
     places = {"fence": asked.aboard.fence, "rally": asked.aboard.rally} | sent
-    flown = _flown(asked, PlacesOnboard(places["fence"], places["rally"], asked.aboard.unread))
-    found = taken_up(_over(asked), planned, asked.state, flown, flown_items=flown_items, now_s=asked.now_mono_s)
+    over = _over(asked)
+    flown = _flown(asked, over, PlacesOnboard(places["fence"], places["rally"], asked.aboard.unread))
+    found = taken_up(over, planned, asked.state, flown, flown_items=flown_items, now_s=asked.now_mono_s)
     text, passed = write_wpl(found.mission), replace(planned, items=planned.items[: found.joined.item])
     record = PlanRecord(
         t_utc_s=time.time(),
@@ -119,7 +120,8 @@ def check_take_up(asked: AskedTakeUp, onboard: OnboardMission, *, report: Progre
     row = fence_row(fence_from_doc(asked.document), asked.aboard, asked.parameters, firmware)
     if row is not None and row.state in ("bad", "unknown"):
         raise NotAllowedError(row.text, where="fence", advice=row.mend)
-    found = certified_on_board(_over(asked), onboard, firmware, asked.state, _flown(asked, asked.aboard))
+    over = _over(asked)
+    found = certified_on_board(over, onboard, firmware, asked.state, _flown(asked, over, asked.aboard))
     return json.dumps(certificate_json(found), allow_nan=False)
 
 
@@ -174,8 +176,9 @@ def _list_notes(asked: AskedTakeUp, sent: dict[PlaceList, tuple[Item, ...]], fir
     return notes
 
 
-def _flown(asked: AskedTakeUp, aboard: PlacesOnboard) -> Flown:
+def _flown(asked: AskedTakeUp, over: FlownOver, aboard: PlacesOnboard) -> Flown:
     from telemetry.flight.certified_way import Flown
+    from telemetry.flight.home_height import home_off_m
     from telemetry.flight.preflight.fence_check import flown_within
 
     if aboard.unread:
@@ -183,15 +186,14 @@ def _flown(asked: AskedTakeUp, aboard: PlacesOnboard) -> Flown:
         raise NotAllowedError(what, where="fence", advice="Look at the link, then press it again.")
     demands = demands_from_doc(asked.document)
     fence, rally = flown_within(fence_from_doc(asked.document), aboard)
-    return Flown(demands.profile, demands.clearance(), asked.parameters, fence, rally)
+    off_m = home_off_m(over.ground, asked.took_off, asked.state)
+    return Flown(demands.profile, demands.clearance(), asked.parameters, fence, rally, off_m)
 
 
 def _over(asked: AskedTakeUp) -> FlownOver:
-    from telemetry.flight.home_height import check_home_height
     from telemetry.flight.taking_up import FlownOver
 
     ground = load_terrain(asked.directory)
-    check_home_height(ground, asked.took_off, asked.state)
     return FlownOver(ground, with_seen(ground, asked.directory, asked.document.seen_id, asked.maps, asked.state))
 
 

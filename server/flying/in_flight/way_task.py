@@ -61,7 +61,7 @@ def judge_way(asked: WayAsked, *, report: Progress) -> WayJudged:
     from server.library.fences import fence_from_doc
     from server.library.terrains import load_terrain
     from telemetry.flight.certified_way import Flown, judged_way, nearest_rally, part_for
-    from telemetry.flight.home_height import check_home_height
+    from telemetry.flight.home_height import home_off_m
     from telemetry.mavlink.items import mission_items
 
     report("Judging the way", None)
@@ -75,8 +75,7 @@ def judge_way(asked: WayAsked, *, report: Progress) -> WayJudged:
         wish = replace(wish, point=nearest_rally(rally, asked.state))
     speed_m_s = asked.body.speed_m_s or demands.profile.mean_speed_m_s
     ground = load_terrain(asked.terrain)
-    if is_in_the_air(asked.state):
-        check_home_height(ground, asked.took_off, asked.state)
+    off_m = home_off_m(ground, asked.took_off, asked.state) if is_in_the_air(asked.state) else 0.0
     seen = with_seen(ground, asked.terrain, asked.document.seen_id, asked.maps, asked.state)
     way = judged_way(
         part_for(ground, asked.state, wish, rally),
@@ -89,6 +88,7 @@ def judge_way(asked: WayAsked, *, report: Progress) -> WayJudged:
             asked.parameters,
             fence,
             rally,
+            off_m,
         ),
         speed_m_s=speed_m_s,
         now_s=asked.now_mono_s,

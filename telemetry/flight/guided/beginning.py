@@ -1,12 +1,14 @@
-"""Where and how a script or a certified way may begin."""
+"""Where and how a script or a certified way may begin, and where home may be set on the ground."""
 
 from __future__ import annotations
 
 import math
 
+from mapping.geometry.frames import apart_m
 from telemetry.errors import NotAllowedError
 from telemetry.flight.guided.handover import away_m, is_fresh
 from telemetry.flight.guided.orders import Place
+from telemetry.flight.home_watch import HomePlace
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.topics.requests import FlyWay, StartGuided, TakeUp
 from telemetry.topics.vehicle import VehicleState
@@ -14,6 +16,8 @@ from telemetry.topics.vehicle import VehicleState
 BEGINS_M, STANDS_M_S = 1.0, 1.0
 """From where a way begins, and how fast, the vehicle may be: well within the following error of its certificate."""
 OFF_THE_GROUND_M = 0.5
+HOME_BESIDE_M, HOME_UP_M = 3.0, 2.0
+"""What a standing receiver and barometer wander, as between the check and the start."""
 
 
 def why_moves(state: VehicleState) -> NotAllowedError | None:
@@ -62,3 +66,19 @@ def is_off_the_ground(state: VehicleState) -> bool:
     if state.landed is None:
         return (state.alt_rel_home_m or 0.0) > OFF_THE_GROUND_M
     return state.landed in ("taking_off", "in_air")
+
+
+def check_stands_there(state: VehicleState, wanted: HomePlace, now_s: float) -> None:
+    """A start is checked for home where the vehicle stands: elsewhere it is not set on the ground.
+
+    Raises NotAllowedError.
+    """
+    if state.lat_deg is None or state.lon_deg is None or state.alt_amsl_m is None or not is_fresh(state, now_s):
+        raise NotAllowedError("Where the vehicle stands is not known.", advice="Wait for its position.")
+    away_m = apart_m((state.lat_deg, state.lon_deg), (wanted.lat_deg, wanted.lon_deg))
+    up_m = wanted.alt_amsl_m - state.alt_amsl_m
+    if not (away_m <= HOME_BESIDE_M and abs(up_m) <= HOME_UP_M):
+        what = (
+            f"That home is {away_m:.1f} m beside and {abs(up_m):.1f} m {'above' if up_m > 0 else 'below'} the vehicle."
+        )
+        raise NotAllowedError(what, advice="On the ground home is set where the vehicle stands; elsewhere in the air.")

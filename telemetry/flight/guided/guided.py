@@ -21,7 +21,7 @@ from telemetry.flight.guided.leading import Leading
 from telemetry.flight.guided.orders import GuidedOrders, Place
 from telemetry.flight.guided.pending_command import PendingCommand, Then
 from telemetry.flight.guided.script_targets import bearing_rad
-from telemetry.flight.guided.script_watches import ModeWatch, Punctuality, Standstill
+from telemetry.flight.guided.script_watches import HomeWatched, ModeWatch, Punctuality, Standstill
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
 from telemetry.mavlink.conversation import GROUND_STATION, Endpoints
 from telemetry.topics.messages import FlightPhase, FlightStatus, GuidedTarget
@@ -60,7 +60,7 @@ class GuidedScript:
         self._came_from: Place | None = None
         """The place that was reached last; nowhere after a take-off or a pause."""
         self._request, self._endpoints, self._orders = request, Endpoints(target, own), GuidedOrders(firmware, target)
-        self._watch, self._punctuality = ModeWatch(), Punctuality()
+        self._watch, self._home_watched, self._punctuality = ModeWatch(), HomeWatched(), Punctuality()
         self._targets = request.targets
         self._takeoff_m = request.takeoff_alt_rel_home_m if isinstance(request, StartGuided) else -math.inf
         self.phase: FlightPhase = "idle"
@@ -206,6 +206,8 @@ class GuidedScript:
         if self.phase != "arming" and (words := self._watch.interruption(state)):
             landed = self.phase == "returning" and not state.armed
             return self._land() if landed else self._interrupt(words)
+        if self.phase in ("flying", "paused") and (words := self._home_watched.interruption(state)):
+            return [*self._go_to(self._here(), now_s, holds=True), *self._interrupt(words)]
         step = {"taking_off": self._climb, "flying": self._fly, "paused": self._hold, "returning": self._return}
         return step[self.phase](state, now_s) if self.phase in step else []
 

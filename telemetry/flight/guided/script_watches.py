@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
+from mapping.geometry.frames import apart_m
 from telemetry.flight.guided.handover import away_m
 from telemetry.flight.guided.orders import Place
+from telemetry.flight.home_watch import MOVED_M, HomePlace, home_of
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.vehicle import VehicleState
 
@@ -11,6 +15,8 @@ PATIENCE_S = 10.0
 NEARER_M = 0.5
 """Less may be the vehicle's swaying."""
 LEVEL_M = 0.5
+FOLLOWED_M = 2.0
+"""Up to here PX4 may correct home's height in flight, by its receiver: 1.2 m were measured. Places go with it."""
 
 
 class ModeWatch:
@@ -40,6 +46,26 @@ class ModeWatch:
         if state.critical:
             return f"The vehicle has changed to {state.mode} by itself: a failsafe is active."
         return f"The flight mode was changed to {state.mode}: the pilot took over."
+
+
+class HomeWatched:
+    """Home as it was when the script had taken off, or set out: its places count from there."""
+
+    def __init__(self) -> None:
+        self._home: HomePlace | None = None
+
+    def interruption(self, state: VehicleState) -> str:
+        """Why the script must end: its places would be elsewhere, or as much higher or lower. Empty: they are not."""
+        home = home_of(state)
+        self._home = before = self._home or home
+        if home is None or before is None:
+            return ""
+        away_m = apart_m((before.lat_deg, before.lon_deg), (home.lat_deg, home.lon_deg))
+        rose_m = home.alt_amsl_m - before.alt_amsl_m
+        if away_m <= MOVED_M and abs(rose_m) <= FOLLOWED_M:
+            return ""
+        far = f"{math.hypot(away_m, rose_m):.1f} m"
+        return f"Home was moved by {far}: what is flown was certified for the home before. The vehicle holds."
 
 
 class Punctuality:

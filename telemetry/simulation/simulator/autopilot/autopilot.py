@@ -77,7 +77,8 @@ class Autopilot(SimulatedPilot):
             return "failed"
         self.armed = True
         self._armed_s = self._idle_s = self.now_s
-        self._set_home()
+        if not self.home_is_fixed:
+            self._set_home()
         self.tell(StateChanged())
         self.say(6, "Arming motors")
         return "accepted"
@@ -155,6 +156,13 @@ class Autopilot(SimulatedPilot):
     def _turned(self, heading_rad: float | None) -> Answer:
         if heading_rad is not None:
             self.turn_to(heading_rad)
+        return "accepted"
+
+    def set_home(self, place_neu: Vec3 | None) -> Answer:
+        """None: where it is, as high as it is."""
+        if not (self.home_known and self.position_ok):
+            return "failed"
+        self.fix_home(self.p_neu if place_neu is None else place_neu)
         return "accepted"
 
     def set_current(self, seq: int) -> Answer:

@@ -108,7 +108,7 @@ class AnyPilot:
         self.now_s = 0.0
         self.armed = self.flying = self.crashed = False
         self.home_neu: Vec3 = (0.0, 0.0, 0.0)
-        self.home_known = False
+        self.home_known = self.home_is_fixed = False
         self.heading_goal_rad = 0.0
         self.p_neu: Vec3 = (0.0, 0.0, 0.0)
         self.v_neu: Vec3 = (0.0, 0.0, 0.0)
@@ -144,6 +144,11 @@ class AnyPilot:
         lat, lon = step.lat_deg, step.lon_deg
         n, e, _ = self.frame.neu_from_geodetic(lat, lon, 0.0) if lat or lon else self.p_neu
         return n, e, step.alt_m + (self.home_neu[2] if step.above == "home" else -self.frame.alt_amsl_m)
+
+    def fix_home(self, place_neu: Vec3) -> None:
+        """By an order: it stays there, also when the vehicle arms elsewhere."""
+        self.home_neu, self.home_is_fixed = place_neu, True
+        self.tell(HomeSet())
 
     def face(self, goal_neu: Vec3, *, at_least_m: float = 0.0) -> None:
         """Turn to a place, unless it is nearer than that."""

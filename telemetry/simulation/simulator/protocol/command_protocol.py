@@ -77,6 +77,7 @@ class Commands:
             wire.MAV_CMD_DO_CHANGE_SPEED: lambda order: autopilot.change_speed(whole(order.params[0]), order.params[1]),
             wire.MAV_CMD_CONDITION_YAW: self._turn,
             wire.MAV_CMD_DO_SET_MISSION_CURRENT: lambda order: autopilot.set_current(whole(order.params[0])),
+            wire.MAV_CMD_DO_SET_HOME: self._set_home,
         }
 
     def run(self, order: ReceivedOrder) -> int:
@@ -149,6 +150,12 @@ class Commands:
         if order.params[0] > 0:
             self._pilot.change_speed(1, order.params[0])
         return self._pilot.go_to(goal, heading_rad=_heading(order.params[3]))
+
+    def _set_home(self, order: ReceivedOrder) -> Answer:
+        if order.params[0] == 1 or (order.lat_deg == 0.0 and order.lon_deg == 0.0):
+            return self._pilot.set_home(None)
+        place = self._place(order.lat_deg, order.lon_deg, order.alt_m, order.frame)
+        return "denied" if place is None else self._pilot.set_home(place)
 
     def _pause(self, order: ReceivedOrder) -> Answer:
         if order.params[0] == 0:

@@ -257,7 +257,9 @@ class Px4Pilot(Px4Flying):
         self.target = self.trajectory.motion
         if self._has_landed(sensed):
             return None
-        if self._moving_home.step(self.now_s - self._ramp_s, self.parameters["COM_HOME_EN"] == 1):
+        if not self.home_is_fixed and self._moving_home.step(
+            self.now_s - self._ramp_s, self.parameters["COM_HOME_EN"] == 1
+        ):
             self.home_neu = (*self.home_neu[:2], self._home_up_m + self._moving_home.shift_m)
             self.tell(HomeSet())
         tilt = self.parameters["MPC_TILTMAX_LND" if self.above_ground_m < 0.3 else "MPC_TILTMAX_AIR"]
@@ -360,7 +362,22 @@ class Px4Pilot(Px4Flying):
             self._ready_said = True
             self.say(6, "Ready for takeoff!")
 
+    def set_home(self, place_neu: Vec3 | None) -> Verdict:
+        """None: where it is, as high as it is; such a home is taken anew when it arms."""
+        if self.parameters["COM_HOME_EN"] != 1:
+            return "denied"
+        if not (self.home_known and self.position_ok):
+            return "rejected"
+        if place_neu is None:
+            self.home_is_fixed = False
+            self._set_home()
+        else:
+            self.fix_home(place_neu)
+        return "accepted"
+
     def _set_home(self) -> None:
+        if self.home_is_fixed:
+            return
         self.home_neu, self._home_up_m = self.p_neu, self.p_neu[2]
         self._moving_home.begin()
         self.tell(HomeSet())

@@ -26,7 +26,6 @@ from telemetry.simulation.simulator.protocol.px4.px4_numbers import name_of
 
 ON_THE_GROUND_ONLY = {
     wire.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN,
-    wire.MAV_CMD_DO_SET_HOME,
     wire.MAV_CMD_DO_FENCE_ENABLE,
     wire.MAV_CMD_DO_MOTOR_TEST,
 }
@@ -48,6 +47,7 @@ class Px4Commands:
             wire.MAV_CMD_DO_REPOSITION: self._reposition,
             wire.MAV_CMD_DO_CHANGE_SPEED: lambda order: pilot.change_speed(whole(order.params[0]), order.params[1]),
             wire.MAV_CMD_DO_SET_MISSION_CURRENT: lambda order: pilot.set_current(whole(order.params[0])),
+            wire.MAV_CMD_DO_SET_HOME: self._set_home,
         }
 
     def run(self, order: ReceivedOrder) -> int:
@@ -124,6 +124,17 @@ class Px4Commands:
         if verdict != "denied" and order.params[0] > 0:
             pilot.change_speed(1, order.params[0])
         return verdict
+
+    def _set_home(self, order: ReceivedOrder) -> Verdict:
+        """As Commander.cpp has it, armed or not. Heights are above mean sea level, whatever frame is named."""
+        if order.params[0] > 0.5:
+            return self._pilot.set_home(None)
+        place = (order.lat_deg, order.lon_deg, order.alt_m)
+        if not (all(map(math.isfinite, place)) and abs(order.lat_deg) <= 90 and abs(order.lon_deg) <= 180):
+            return "denied"
+        frame = self._pilot.frame
+        n, e, _ = frame.neu_from_geodetic(order.lat_deg, order.lon_deg, 0.0)
+        return self._pilot.set_home((n, e, order.alt_m - frame.alt_amsl_m))
 
     def _velocity(self, message: Any) -> Vec3 | None:
         vx, vy, vz = message.vx, message.vy, message.vz

@@ -1,0 +1,163 @@
+"""Home set by order: both autopilots obey, nothing is called somebody else's, and nothing paused is gone on with."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as wire
+
+from mapping.geometry.frames import apart_m, moved_deg
+from telemetry.errors import NotAllowedError, RefusedError
+from telemetry.flight.guided.beginning import check_stands_there
+from telemetry.flight.guided.script_watches import FOLLOWED_M, HomeWatched
+from telemetry.flight.home_watch import HomePlace, HomeWatch, home_of
+from telemetry.topics.requests import Resume, SetHome
+from telemetry.topics.vehicle import VehicleState
+from tests.telemetry.bus_runs import run
+from tests.telemetry.link_bench import ME, Console, until
+from tests.telemetry.simulator_bench import Bench
+from tests.telemetry.test_home_watch import HOME, moved, state
+from tests.telemetry.test_mavlink_flights import simulated
+from tests.telemetry.test_mission_taken_up import VEHICLES, holding
+from tests.telemetry.test_px4_flights import QUICK
+from tests.telemetry.test_px4_simulator import ready
+
+SET_HOME, ARM = wire.MAV_CMD_DO_SET_HOME, 400
+ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
+
+
+def beside(told: VehicleState, east_m: float, up_m: float = 0.0) -> SetHome:
+    home = home_of(told)
+    assert home is not None
+    lat_deg, lon_deg = moved_deg((home.lat_deg, home.lon_deg), east_m, 0.0)
+    return SetHome(ME, lat_deg, lon_deg, home.alt_amsl_m + up_m)
+
+
+def is_home(bench: Console, wanted: SetHome) -> bool:
+    home = home_of(bench.state)
+    wanted_deg = wanted.lat_deg, wanted.lon_deg
+    return home is not None and apart_m((home.lat_deg, home.lon_deg), wanted_deg) < 0.1
+
+
+@pytest.mark.parametrize(("autopilot", "parameters"), VEHICLES)
+def test_it_is_set_told_and_written_down_and_what_is_paused_does_not_go_on(autopilot: str, parameters: object) -> None:
+    async def whole() -> None:
+        async with holding(autopilot, parameters) as (bench, _, _digest):
+            wanted = beside(bench.state, 25.0, -3.0)
+            await bench.handle(wanted)
+            await until(lambda: is_home(bench, wanted))
+            assert not [text for text in bench.texts if "Home has moved" in text], "it is our own order"
+            assert [words for words in bench.commands if words.startswith("set home to")]
+            with pytest.raises(NotAllowedError, match="certified for the home before"):
+                await bench.handle(Resume(ME))
+
+    run(whole)
+
+
+def test_it_is_not_set_while_a_mission_is_flown_nor_elsewhere_on_the_ground() -> None:
+    async def whole() -> None:
+        async with simulated() as (bench, simulator):
+            await until(lambda: home_of(bench.state) is not None and bench.state.position_t_mono_s is not None)
+            with pytest.raises(NotAllowedError, match=r"40\.\d m beside"):
+                await bench.handle(beside(bench.state, 40.0))
+            here = beside(bench.state, 0.5)
+            await bench.handle(here)
+            await until(lambda: is_home(bench, here))
+            pilot = simulator.vehicle.autopilot
+            assert pilot.home_is_fixed
+
+    run(whole)
+
+
+def test_a_refusal_is_told_in_the_vehicles_words() -> None:
+    async def whole() -> None:
+        async with holding("px4", (*QUICK, ("COM_HOME_EN", 0.0))) as (bench, _, _digest):
+            with pytest.raises(RefusedError, match="set home"):
+                await bench.handle(beside(bench.state, 25.0))
+            assert not is_home(bench, beside(bench.state, 25.0))
+
+    run(whole)
+
+
+def test_somebody_elses_home_is_an_alarm_beside_an_order_of_our_own() -> None:
+    watch = HomeWatch()
+    assert watch.on_state(state(HOME)) is None
+    watch.expect(moved(40.0, 0.0, 2.0))
+    assert watch.on_state(state(moved(-40.0, 0.0, 0.0))) is not None
+    assert watch.on_state(state(moved(40.2, 0.0, 2.1))) is None
+    watch.expect(None)
+    assert watch.on_state(state(moved(40.0, 0.0, 2.0))) is None
+    assert watch.on_state(state(HOME)) is not None
+
+
+@pytest.mark.parametrize(
+    ("east_m", "up_m", "refused"), [(0.0, 0.0, False), (2.9, 1.9, False), (3.2, 0.0, True), (0.0, -2.2, True)]
+)
+def test_on_the_ground_it_is_set_where_the_vehicle_stands(east_m: float, up_m: float, refused: bool) -> None:
+    stands = VehicleState(
+        1, 1, lat_deg=HOME.lat_deg, lon_deg=HOME.lon_deg, alt_amsl_m=HOME.alt_amsl_m, position_t_mono_s=10.0
+    )
+    if not refused:
+        check_stands_there(stands, moved(east_m, 0.0, up_m), 10.0)
+        return
+    with pytest.raises(NotAllowedError, match="the vehicle"):
+        check_stands_there(stands, moved(east_m, 0.0, up_m), 10.0)
+
+
+def test_where_the_vehicle_stands_must_be_known_and_of_now() -> None:
+    stands = VehicleState(
+        1, 1, lat_deg=HOME.lat_deg, lon_deg=HOME.lon_deg, alt_amsl_m=HOME.alt_amsl_m, position_t_mono_s=10.0
+    )
+    for now_s, told in ((13.0, stands), (10.0, VehicleState(1, 1))):
+        with pytest.raises(NotAllowedError, match="not known"):
+            check_stands_there(told, HOME, now_s)
+
+
+@pytest.mark.parametrize(
+    ("to", "ends"),
+    [
+        ((0.0, 0.0, FOLLOWED_M - 0.1), False),
+        ((0.9, 0.0, -FOLLOWED_M + 0.1), False),
+        ((0.0, 0.0, FOLLOWED_M + 0.1), True),
+        ((0.0, 0.0, -FOLLOWED_M - 0.1), True),
+        ((0.0, 1.2, 0.0), True),
+    ],
+)
+def test_a_script_follows_no_home_that_was_set_elsewhere(to: tuple[float, float, float], ends: bool) -> None:
+    watched = HomeWatched()
+    assert watched.interruption(VehicleState(1, 1)) == ""
+    assert watched.interruption(state(HOME)) == ""
+    said = watched.interruption(state(moved(*to)))
+    assert bool(said) == ends
+    assert not ends or "certified for the home before" in said
+
+
+def command_int(bench: Bench, first: float, place: HomePlace, frame: int = 0) -> int:
+    message = wire.MAVLink_command_int_message(
+        1, 1, frame, SET_HOME, 0, 0, first, math.nan, math.nan, math.nan, round(place.lat_deg * 1e7),
+        round(place.lon_deg * 1e7), place.alt_amsl_m,
+    )  # fmt: skip
+    bench.send(message)
+    bench.advance(0.1)
+    return bench.last("COMMAND_ACK").result
+
+
+@pytest.mark.parametrize("make", ["ardupilot", "px4"])
+def test_a_simulated_vehicle_keeps_the_home_that_was_set_when_it_arms(make: Any) -> None:
+    bench = ready() if make == "px4" else Bench()
+    pilot = bench.vehicle.autopilot
+    bench.until(lambda: pilot.position_ok)
+    lat_deg, lon_deg, alt_m = pilot.frame.geodetic_from_neu((12.0, 5.0, 1.5))
+    assert command_int(bench, 0.0, HomePlace(lat_deg, lon_deg, alt_m)) == ACCEPTED
+    assert pilot.home_neu == pytest.approx((12.0, 5.0, 1.5), abs=0.02)
+    pilot.set_mode("HOLD" if make == "px4" else "GUIDED")
+    assert pilot.arm() == "accepted"
+    assert pilot.home_neu == pytest.approx((12.0, 5.0, 1.5), abs=0.02)
+    if make == "px4":
+        assert command_int(ready(COM_HOME_EN=0.0), 1.0, HomePlace(0.0, 0.0, 0.0)) == DENIED
+    else:
+        assert command_int(bench, 0.0, HomePlace(lat_deg, lon_deg, alt_m), frame=10) == DENIED
+        assert command_int(bench, 1.0, HomePlace(0.0, 0.0, 0.0)) == ACCEPTED
+        assert pilot.home_neu == pytest.approx(pilot.p_neu, abs=0.05)
