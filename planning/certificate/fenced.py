@@ -23,6 +23,12 @@ FENCE_MEND = (
 )
 
 
+RETURN_MEND = (
+    "The line itself keeps to the fence. Move home to where the straight ways back pass beside the zone, or leave out"
+    " what lies behind it: a guided way leads there and home around the zone, once its own return is accepted."
+)
+
+
 def fence_verdict(dsm: Dsm, line: FlownLine, params: ClearanceParams) -> FenceVerdict | None:
     """None: there is no fence."""
     if not line.fence:
@@ -44,7 +50,7 @@ def fence_verdict(dsm: Dsm, line: FlownLine, params: ClearanceParams) -> FenceVe
 def fence_reason(verdict: FenceVerdict | None) -> Reason | None:
     if verdict is None or verdict.keeps:
         return None
-    return Reason("fence", " ".join(verdict.faults), FENCE_MEND)
+    return Reason("fence", " ".join(verdict.faults), RETURN_MEND if verdict.is_of_ways_back else FENCE_MEND)
 
 
 def rally_reasons(

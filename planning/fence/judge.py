@@ -64,6 +64,11 @@ class FenceVerdict:
     faults: tuple[str, ...]
     """Sentences; none when the fence is kept."""
 
+    @property
+    def is_of_ways_back(self) -> bool:
+        """All that is wrong is a way back that meets a shape, at no forbidden height."""
+        return self.line_keeps and len(self.faults) == 1 and self.min_distance_m < self.margin_m
+
 
 def judge_fence(fence: Fence, flight: FencedFlight) -> FenceVerdict:
     """The verdict on a flight of which all places are finite."""

@@ -50,7 +50,9 @@ from planning.terrain.dsm import Dsm, SurfaceModel, true_cells
 LIFTS_M = (0.0, 0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 13.0, 21.0, 34.0)
 """Tried one after the other above what the surface asks for: home may lie lower, and returns may need more."""
 MENDED_BY_HEIGHT = frozenset({"clearance", "terrain_hit", "home_drop", "return_height", "return_near_home"})
-OWN_RETURNS = frozenset({"return_unknown", "return_height", "return_near_home", "rally"})
+RETURN_FENCE = "return_fence"
+"""The line keeps to the fence, the vehicle's own straight ways back meet a zone; no height mends that."""
+OWN_RETURNS = frozenset({"return_unknown", "return_height", "return_near_home", "rally", RETURN_FENCE})
 """The vehicle's own way home from the line is not clear: who is on a certified way home does not need it."""
 LANDINGS = frozenset({"home_column", "home_on_top"})
 """What stands where it would land at home."""
@@ -118,7 +120,8 @@ def guided_way(dsm: Dsm, ground: SurfaceModel, here: Here, wish: Wish, demand: D
     if not len(around_xy_m):
         return way
     around = _lowest(asked, replace(shape, direct=False, around_xy_m=around_xy_m))
-    return way if around.problem == "way" else replace(around, turns=len(around_xy_m))
+    is_no_better = around.problem in ("way", way.problem)
+    return way if is_no_better else replace(around, turns=len(around_xy_m))
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,10 +176,13 @@ def _around(asked: _Asked, here: Here, shape: _Shape, way: GuidedWay) -> F64:
 
 
 def _codes(certificate: Certificate, wish: Wish) -> set[str]:
-    """Without a fence that only the vehicle's own ways back would breach, for who is on the way back."""
-    codes = {reason.code for reason in certificate.reasons}
-    fence = certificate.fence
-    return codes - {"fence"} if isinstance(wish, RETURNS) and fence is not None and fence.line_keeps else codes
+    """Of a fence that only the vehicle's own ways back would breach nothing, for who is on the way back."""
+    codes, fence = {reason.code for reason in certificate.reasons}, certificate.fence
+    if "fence" not in codes or fence is None:
+        return codes
+    if isinstance(wish, RETURNS):
+        return codes - {"fence"} if fence.line_keeps else codes
+    return codes - {"fence"} | {RETURN_FENCE} if fence.is_of_ways_back else codes
 
 
 def _problem(codes: set[str], wish: Wish) -> Problem | None:

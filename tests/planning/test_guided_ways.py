@@ -149,9 +149,23 @@ def test_a_home_that_may_lie_lower_raises_the_way() -> None:
 def test_a_fence_refuses_with_its_own_words_and_is_not_flown_over() -> None:
     dsm = model(flat())
     fence = Fence(circles=(circle(*at(dsm, 75.0, 60.0), 5.0, inclusion=False, where="test"),))
-    way = asked(flat(), GoTo(8.0, at(dsm, 100.0, 60.0)), demand=replace(DEMAND, fence=fence))
+    way = asked(flat(), GoTo(8.0, at(dsm, 75.0, 60.0)), demand=replace(DEMAND, fence=fence))
     assert way.problem == "way"
     assert "exclusion circle 1" in way.reasons[0]
+
+
+@pytest.mark.parametrize("wish", ["to", "orbit"])
+def test_behind_a_fence_only_the_vehicles_own_return_is_not_clear(wish: str) -> None:
+    """The line leads around the zone; the straight return would cross it: that may be accepted, the line is kept."""
+    dsm = model(flat())
+    fence = Fence(circles=(circle(*at(dsm, 80.0, 60.0), 5.0, inclusion=False, where="test"),))
+    goal = at(dsm, 100.0, 60.0)
+    way = asked(flat(), GoTo(8.0, goal) if wish == "to" else Orbit(goal, 5.0, 8.0), demand=replace(DEMAND, fence=fence))
+    assert (way.problem, way.turns > 0) == ("return", True)
+    assert way.certificate.fence is not None
+    assert (way.certificate.fence.keeps, way.certificate.fence.line_keeps) == (False, True)
+    assert "A way home" in way.reasons[0]
+    assert "a guided way leads there" in way.certificate.reasons[0].mend
 
 
 @pytest.mark.parametrize("wish", ["to", "orbit"])
@@ -186,7 +200,7 @@ def test_ways_home_lead_around_a_fence_that_hides_home(wish: str) -> None:
     assert way.turns > 0
     assert way.certificate.fence is not None
     assert (way.certificate.fence.keeps, way.certificate.fence.line_keeps) == (False, True)
-    assert asked(flat(), GoTo(8.0, at(dsm, 60.0, 60.0)), start=start, demand=demand).problem == "way"
+    assert asked(flat(), GoTo(8.0, at(dsm, 60.0, 60.0)), start=start, demand=demand).problem == "return"
 
 
 def test_a_way_home_below_a_ceiling_that_the_vehicles_own_return_breaches_is_flown() -> None:
