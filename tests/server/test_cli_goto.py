@@ -20,6 +20,7 @@ from tests.server.simulated import QUICKLY_DOWN, simulated_vehicle
 pytestmark = pytest.mark.xdist_group("cli-flying")
 
 WEST, NORTH, SIDE_M = 500_000.0, 4_170_000.0, 200
+ON_GROUND = "--home-on-ground"
 QUICK = ("--profile", "mapper-rtk", "--rtl-height-m", 60)
 
 
@@ -62,15 +63,19 @@ def test_up_over_the_wall_and_home(link: str, dsm: Path) -> None:
     assert "not in the air" in on_the_ground.err
     up = goto(link, dsm, "take-off", "--height-m", 5)
     assert (up.code, up.json["flown"]) == (0, True), up.err
-    judged = goto(link, dsm, "to", at(170.5), "--height-m", 5, "--check")
+    doubted = goto(link, dsm, "to", at(170.5), "--height-m", 5, "--check")
+    assert doubted.code != 0
+    assert "was not heard here" in doubted.err
+    assert "--home-on-ground" in doubted.err
+    judged = goto(link, dsm, "to", at(170.5), "--height-m", 5, "--check", ON_GROUND)
     assert (judged.code, judged.json["flown"], judged.json["certified"]) == (0, False, True), judged.err
-    there = goto(link, dsm, "to", at(170.5), "--height-m", 5)
+    there = goto(link, dsm, "to", at(170.5), "--height-m", 5, ON_GROUND)
     assert (there.code, there.json["flown"]) == (0, True), there.err
     assert max(place["alt_rel_home_m"] for place in there.json["places"]) > 9.0 + there.json["required_clearance_m"]
     assert there.json["clearance_m"] >= there.json["required_clearance_m"]
-    turned = goto(link, dsm, "look", at(100.5))
+    turned = goto(link, dsm, "look", at(100.5), ON_GROUND)
     assert turned.code == 0, turned.err
-    home = goto(link, dsm, "home", "--height-m", 5)
+    home = goto(link, dsm, "home", "--height-m", 5, ON_GROUND)
     assert (home.code, home.json["flown"]) == (0, True), home.err
 
 
@@ -80,10 +85,10 @@ def test_a_fence_on_board_is_kept_without_flying(link: str, dsm: Path, tmp_path:
     file.write_text(write_fence(file.name, Fence(circles=(circle(lat, lon, 5.0, inclusion=False, where="t"),)), ()))
     assert hedgehop("fence", link, "upload", file).code == 0
     assert goto(link, dsm, "take-off", "--height-m", 6).code == 0
-    refused = goto(link, dsm, "to", at(130.5), "--height-m", 6)
+    refused = goto(link, dsm, "to", at(130.5), "--height-m", 6, ON_GROUND)
     assert (refused.code, refused.json["flown"], refused.json["problem"]) == (1, False, "way")
     assert "exclusion" in refused.json["reasons"][0]
-    assert goto(link, dsm, "home", "--height-m", 5).code == 0
+    assert goto(link, dsm, "home", "--height-m", 5, ON_GROUND).code == 0
 
 
 @pytest.mark.parametrize(

@@ -28,12 +28,14 @@ from server.cli.shared.output import answer, end_progress, progress, say, say_no
 from server.cli.shared.own_nodes import OPERATOR, Station, own_nodes
 from server.cli.shared.terrain_given import OpenedModel, open_model
 from server.work.clocks import StepTimer
-from telemetry.errors import TelemetryError
+from telemetry.errors import NotAllowedError, TelemetryError
 from telemetry.flight.certified_way import Flown, judged_way, nearest_rally, part_for, way_json, way_request, way_words
+from telemetry.flight.home_height import home_off_m
 from telemetry.flight.preflight.parameters import NAMES
 from telemetry.flight.preflight.prepare import connect
 from telemetry.flight.watch import Watch, watching
 from telemetry.mavlink.address import parse_addresses
+from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.items import mission_items
 from telemetry.topics.messages import FlightStatus
 from telemetry.topics.requests import DownloadPlaces, Pause, ReadParameters
@@ -80,6 +82,9 @@ def goto(
     accept_return: Annotated[
         bool, Option("--accept-return", help="Fly although the vehicle's own return from the way would not be clear.")
     ] = False,
+    home_on_ground: Annotated[
+        bool, Option("--home-on-ground", help="Home lies on the model's ground: nobody has moved it in this flight.")
+    ] = False,
     data_dir: o.Keys = None,
     as_json: o.AsJson = False,
     wanted: GotoOptions,
@@ -89,7 +94,8 @@ def goto(
 ) -> None:
     """Certify one way over the surface model from where the vehicle is, and fly it in GUIDED.
 
-    It is raised as far as it must be, or refused with where and by how much. What sensors see is not known here.
+    It is raised as far as it must be, or refused with where and by how much. What sensors see is not known here, nor
+    whether home was moved since the take-off: a receiver with fixed RTK tells, else --home-on-ground says so.
     """
     parse_addresses(link)
     wish = _wish(action, _place(action, place), wanted)
@@ -106,6 +112,7 @@ def goto(
     model = open_model(dsm, StepTimer(progress), how)
     speed_m_s = vehicle.mean_speed_m_s if wanted.speed_m_s is None else wanted.speed_m_s
     flier = _Flier(link, wish, request, model, speed_m_s, data_dir, may_fly=not check, accepts=accept_return)
+    flier.home_on_ground = home_on_ground
     way, flight = asyncio.run(flier.run())
     flown = flight is not None and flight.phase in ("paused", "landed") and not flier.was_held
     text = way_words(way) if flight is None else (flight.hint or way_words(way))
@@ -157,7 +164,7 @@ class _Flier:
         self._link, self._wish, self._request, self._model = link, wish, request, model
         self._speed_m_s, self._data_dir, self._may_fly, self._accepts = speed_m_s, data_dir, may_fly, accepts
         self._pressed = asyncio.Event()
-        self.was_held = False
+        self.was_held = self.home_on_ground = False
         self._sets_out = False
 
     async def run(self) -> tuple[GuidedWay, FlightStatus | None]:
@@ -213,6 +220,12 @@ class _Flier:
         return Flown(self._request.profile, self._request.clearance(), parameters, fence, points)
 
     def _judged(self, state: VehicleState, flown: Flown) -> GuidedWay:
+        if is_in_the_air(state) and not self.home_on_ground:
+            try:
+                home_off_m(self._model.model, None, state)
+            except NotAllowedError as error:
+                advice = f"{error.advice} Or say that it has not been moved: --home-on-ground."
+                raise NotAllowedError(error.what, where=error.where, advice=advice) from None
         part = self._part(state, flown)
         return judged_way(part, None, state, self._wish, flown, speed_m_s=self._speed_m_s, now_s=time.monotonic())
 
