@@ -21,6 +21,7 @@ from telemetry.flight.guided.beginning import why_moves, why_not_from
 from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_from
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.onboard import OnBoard, Started
+from telemetry.link.procedures import see_home_here
 from telemetry.mavlink.autopilot_orders import HOLD_MODES, MISSION_MODES
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import sequence_of
@@ -82,6 +83,7 @@ async def start_mission(vehicle: AdoptedVehicle, digest: str, read_mission: Read
     else:
         await vehicle.obey(orders.mission_mode())
         await check_again(vehicle.onboard, digest, read_mission)
+        await see_home_here(vehicle)
         await _arm(vehicle)
         await vehicle.obey(orders.start_mission())
         await _see_armed(vehicle)
@@ -110,6 +112,7 @@ async def _see_armed(vehicle: AdoptedVehicle) -> None:
 async def _check_or_disarm(vehicle: AdoptedVehicle, digest: str, read_mission: ReadMission) -> None:
     try:
         await check_again(vehicle.onboard, digest, read_mission)
+        await see_home_here(vehicle)
     except TelemetryError:
         with contextlib.suppress(TelemetryError):  # it switches its motors off by itself soon
             await vehicle.obey(vehicle.orders.disarm())

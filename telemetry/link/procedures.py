@@ -14,6 +14,7 @@ from typing import Any
 
 from planning.basics.plan_model import Firmware
 from telemetry.errors import NotAllowedError, SilentError, TelemetryError
+from telemetry.flight.guided.beginning import home_elsewhere
 from telemetry.flight.guided.feed import Feed
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.mavlink.autopilot_orders import Order
@@ -25,6 +26,8 @@ Procedure = Callable[[Accepted], Coroutine[Any, Any, None]]
 Spawn = Callable[[Coroutine[Any, Any, None]], asyncio.Task[None]]
 ReadParameters = Callable[[tuple[str, ...]], Awaitable[dict[str, float | None]]]
 SHOWS_S = 3.0
+HOME_SHOWS_S = 4.0
+"""A vehicle that takes its home when it arms tells it at once, and again every two seconds."""
 TRIES = 3
 OPTIONS, STRAIGHT_LEGS = "GUID_OPTIONS", 64
 """ArduCopter then flies to the places of GUIDED as it does to waypoints."""
@@ -92,6 +95,16 @@ class Procedures:
 def _refuse_if_open(started: asyncio.Future[None]) -> None:
     if not started.done():
         started.set_exception(NotAllowedError("Another command was given before this one was carried out."))
+
+
+async def see_home_here(vehicle: AdoptedVehicle) -> None:
+    """Raises NotAllowedError where home is not where the vehicle stands, and does not come there."""
+    with contextlib.suppress(SilentError):
+        await vehicle.wait_until(
+            lambda state: home_elsewhere(state) is None, timeout_s=HOME_SHOWS_S, what="take its home where it stands"
+        )
+    if (refusal := home_elsewhere(vehicle.state)) is not None:
+        raise refusal
 
 
 async def change_mode(vehicle: AdoptedVehicle, names: tuple[str, ...], accepted: Callable[[], None]) -> None:

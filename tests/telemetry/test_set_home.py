@@ -13,13 +13,13 @@ from telemetry.errors import NotAllowedError, RefusedError
 from telemetry.flight.guided.beginning import check_stands_there
 from telemetry.flight.guided.script_watches import FOLLOWED_M, HomeWatched
 from telemetry.flight.home_watch import HomePlace, HomeWatch, home_of
-from telemetry.topics.requests import Resume, SetHome
+from telemetry.topics.requests import Resume, SetHome, StartAuto
 from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, Console, until
 from tests.telemetry.simulator_bench import Bench
 from tests.telemetry.test_home_watch import HOME, moved, state
-from tests.telemetry.test_mavlink_flights import simulated
+from tests.telemetry.test_mavlink_flights import items, simulated, start, upload
 from tests.telemetry.test_mission_taken_up import VEHICLES, holding
 from tests.telemetry.test_px4_flights import QUICK
 from tests.telemetry.test_px4_simulator import ready
@@ -67,6 +67,24 @@ def test_it_is_not_set_while_a_mission_is_flown_nor_elsewhere_on_the_ground() ->
             await until(lambda: is_home(bench, here))
             pilot = simulator.vehicle.autopilot
             assert pilot.home_is_fixed
+
+    run(whole)
+
+
+@pytest.mark.parametrize(("autopilot", "parameters"), VEHICLES)
+def test_nothing_starts_with_a_home_that_was_fixed_elsewhere(autopilot: str, parameters: object) -> None:
+    async def whole() -> None:
+        async with simulated(autopilot=autopilot, parameters=parameters, speedup=8.0) as (bench, simulator):
+            report = await upload(bench, items(3))
+            pilot = simulator.vehicle.autopilot
+            await until(lambda: pilot.position_ok)
+            north_m, east_m, up_m = pilot.home_neu
+            pilot.fix_home((north_m + 30.0, east_m, up_m))
+            with pytest.raises(NotAllowedError, match="30 m from where the vehicle stands"):
+                await bench.handle(StartAuto(ME, report.onboard.digest))
+            await until(lambda: not bench.state.armed and not pilot.armed)
+            pilot.fix_home(pilot.p_neu)
+            await start(bench, StartAuto(ME, report.onboard.digest))
 
     run(whole)
 

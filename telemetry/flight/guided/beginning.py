@@ -61,6 +61,19 @@ def _why_not_at(begins: Place, state: VehicleState, now_s: float) -> NotAllowedE
     return None
 
 
+def home_elsewhere(state: VehicleState) -> NotAllowedError | None:
+    """Home that was fixed by an order does not go with the vehicle when it arms: what was checked for where it stands
+    would be flown at other heights, and return elsewhere. None: it is here, or not told."""
+    if None in (state.home_lat_deg, state.home_lon_deg, state.lat_deg, state.lon_deg):
+        return None
+    home, at = (state.home_lat_deg or 0.0, state.home_lon_deg or 0.0), (state.lat_deg or 0.0, state.lon_deg or 0.0)
+    away_m = apart_m(home, at)
+    if away_m <= HOME_BESIDE_M + 2 * (state.horizontal_accuracy_m or 0.0):
+        return None
+    what = f"Home lies {away_m:.0f} m from where the vehicle stands: an order has fixed it there."
+    return NotAllowedError(what, advice="Set home here (Fly, Home), or restart the vehicle; then check again.")
+
+
 def is_off_the_ground(state: VehicleState) -> bool:
     """By its own word, else by its height above home."""
     if state.landed is None:
