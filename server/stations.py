@@ -20,6 +20,7 @@ from server.flying.apart.other_vehicles import Other, known
 from server.flying.checklist_desk import ChecklistDesk
 from server.flying.checklists import Checklists
 from server.flying.flight_desk import FlightDesk
+from server.flying.in_flight.home_desk import HomeDesk
 from server.flying.in_flight.take_up_desk import TakingUp
 from server.flying.in_flight.way_desk import WayDesk
 from server.flying.parameter_desk import ParameterDesk
@@ -151,6 +152,7 @@ class Flying:
             link, work, aboard, checklist, workspace, self.live, self._watch, bus, present, taking_up, is_alone=alone
         )
         self.ways = WayDesk(link, self.live, workspace, library, lane, self._watch, present)
+        self.home = HomeDesk(link, self.live, self.ways, lane, present, lease.server_operator)
         name = "" if alone else wanted.name
         self.parameters = ParameterDesk(link, self.live, aboard, library.root, self.desk.on_parameters, name)
         self.recording = Recording(number, recordings, shared.shelf, self.nodes, present)
@@ -190,6 +192,7 @@ class Flying:
             self._log_checklists(),
             self._hear_of_nodes(),
             self._followed.run(),
+            self.home.run(),
             self.logs.run(),
             *self._obstacles.loops(),
             *starts,
@@ -274,6 +277,7 @@ class Flying:
     def _on_state(self, state: VehicleState) -> None:
         was_armed = self.live.armed
         self.live.on_state(state)
+        self.home.on_state(state)
         self._shared.on_vehicle()
         if was_armed and not state.armed:
             self.desk.on_disarmed()
@@ -289,6 +293,7 @@ class Flying:
         self._present.publish(LinkMessage(link=status))
         if status.adopted is None and self.live.state is not None:
             self.live.forget()
+            self.home.forget()
             self._shared.on_vehicle()
         self.desk.on_link(status)
         self.ways.on_link(self._aboard.vehicle)

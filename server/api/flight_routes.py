@@ -12,7 +12,10 @@ from server.schemas import (
     FlyState,
     FlyWayBody,
     GuidedState,
+    HomeBody,
+    HomeState,
     ResumeFlight,
+    SetHomeBody,
     StartFlight,
     TakeUpPlan,
     UploadPlan,
@@ -78,6 +81,27 @@ async def drop_way(operator: InCharge, flying: Fly) -> Response:
     """Puts away what was judged; what is flown goes on."""
     del operator
     return answer(flying.ways.drop())
+
+
+@router.put("/home", response_model=HomeState)
+async def judge_home(body: HomeBody, operator: InCharge, flying: Fly) -> Response:
+    """Says what home would be there, over the open surface model, and what the return would be worth; nothing is set.
+
+    409 where home cannot be there."""
+    return answer(await flying.home.judge(operator, body))
+
+
+@router.post("/home/set", **DONE)
+async def set_home(body: SetHomeBody, operator: InCharge, flying: Fly) -> None:
+    """Sets the home that was judged last; in the air only where the vehicle holds. 404 for one that is out of date."""
+    await flying.home.set(operator, body)
+
+
+@router.delete("/home", response_model=HomeState)
+async def drop_home(operator: InCharge, flying: Fly) -> Response:
+    """Puts away what was judged."""
+    del operator
+    return answer(flying.home.drop())
 
 
 def _add_command(name: str, command: Callable[[Operator], LinkRequest], description: str = "") -> None:

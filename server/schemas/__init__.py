@@ -42,6 +42,7 @@ from server.schemas.flight_docs import (
     VehicleLogsDoc,
 )
 from server.schemas.guided_docs import FlyWayBody, GuidedState, WayAction, WayBody, WayDoc, WaySpeedBody
+from server.schemas.home_docs import HomeAskedDoc, HomeBody, HomeState, ReturnDoc, SetHomeBody
 from server.schemas.library_docs import (
     CloudDoc,
     CloudShareDoc,
@@ -134,6 +135,7 @@ from server.schemas.stream import (
     FlyMessage,
     GuidedMessage,
     HealthMessage,
+    HomeMessage,
     JobMessage,
     LeaseMessage,
     LibraryMessage,

@@ -9,6 +9,7 @@ from pydantic import Field
 from server.schemas.account_docs import LeaseDoc, MeDoc
 from server.schemas.flight_docs import FlyState, FollowDoc, NodeDoc, RecordingDoc, Source, TrackDoc
 from server.schemas.guided_docs import GuidedState
+from server.schemas.home_docs import HomeState
 from server.schemas.library_docs import JobDoc, LibraryState
 from server.schemas.obstacle_docs import ObstaclesState, SensorName
 from server.schemas.result_docs import ErrorDoc, PlanState
@@ -172,6 +173,13 @@ class GuidedMessage(Message):
     guided: GuidedState
 
 
+class HomeMessage(Message):
+    """Home that is to be set, and the vehicle's own return since it was moved."""
+
+    type: Literal["home"] = "home"
+    home: HomeState
+
+
 class LeaseMessage(Message):
     type: Literal["lease"] = "lease"
     lease: LeaseDoc
@@ -313,6 +321,7 @@ ServerMessage = Annotated[
     | FlightMessage
     | FlyMessage
     | GuidedMessage
+    | HomeMessage
     | LeaseMessage
     | MeMessage
     | HealthMessage

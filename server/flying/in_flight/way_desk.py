@@ -91,7 +91,7 @@ class WayDesk:
         self._in_hand, self._is_judging, vehicle = flown, True, self._adopted
         self._tell()
         try:
-            judged = await self._judged(operator, body, terrain)
+            judged: WayJudged = await self._lane.call(judge_way, await self.asked(operator, body))
             self._check_still(vehicle, flown)
             self._in_hand = _InHand(_doc(judged, body, terrain), judged, time.monotonic())
         finally:
@@ -154,15 +154,14 @@ class WayDesk:
             self._in_hand = None
             self._tell()
 
-    # How
-
-    async def _judged(self, operator: Operator, body: WayBody, terrain: TerrainDoc) -> WayJudged:
-        state = self._vehicle()
+    async def asked(self, operator: Operator, body: WayBody) -> WayAsked:
+        """All that a way is judged by now. Raises what the vehicle said, NoVehicleError, NotReadyError."""
+        terrain, state = self._terrain(), self._vehicle()
         parameters = await self._link.call(ReadParameters(NAMES["px4" if state.autopilot == "px4" else "ardupilot"]))
         fence = await self._link.call(DownloadPlaces(operator, "fence"))
         rally = await self._link.call(DownloadPlaces(operator, "rally"))
         maps = await asyncio.to_thread(seen_maps, self._watch)
-        asked = WayAsked(
+        return WayAsked(
             body,
             self._library.terrain_dir(terrain.id),
             self._workspace.document,
@@ -174,7 +173,8 @@ class WayDesk:
             flown_places(self._live.track.states),
             home_of_takeoff(self._live.track.states),
         )
-        return await self._lane.call(judge_way, asked)
+
+    # How
 
     def _check_still(self, vehicle: str | None, flown: _InHand | None) -> None:
         """Raises ConflictError for a way that nobody can fly any more, once it is judged."""

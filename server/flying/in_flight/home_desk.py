@@ -1,0 +1,214 @@
+"""Home: judged where it is asked for, set by order, and the vehicle's own return judged anew once home was moved.
+
+The return is judged by a worker, one judgement at a time; what has changed meanwhile is judged next.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from mapping.errors import DescribedError
+from mapping.geometry.frames import apart_m
+from server.errors import CheckNeededError, ConflictError, NotFoundError
+from server.flying.in_flight.home_task import HomeJudged, judge_home, judge_return
+from server.flying.in_flight.way_desk import WayDesk
+from server.heard.channel import Channel
+from server.schemas import (
+    HomeAskedDoc,
+    HomeBody,
+    HomeMessage,
+    HomeState,
+    Pages,
+    ReasonDoc,
+    ReturnDoc,
+    SetHomeBody,
+    WayBody,
+)
+from server.schemas.flight_docs import CHECK_FRESH_S
+from server.work.jobs import Lane
+from telemetry.bus.link_client import LinkClient
+from telemetry.flight.home_watch import HomePlace, home_of, home_of_takeoff, is_there
+from telemetry.mavlink.believing import is_in_the_air
+from telemetry.topics.requests import Operator, SetHome
+from telemetry.topics.vehicle import VehicleState
+
+ANYWHERE = WayBody(action="home")
+"""Gathers what every way is judged by."""
+FLOWN_M, OLD_S = 10.0, 15.0
+"""A return is judged again from so far away, or so much later, while home lies elsewhere than at the take-off."""
+LOOK_EVERY_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Judged:
+    """Of the return: for which home, from where."""
+
+    home: HomePlace
+    at_deg: tuple[float, float]
+    doc: ReturnDoc
+
+
+class HomeDesk:
+    """All methods belong to the event loop."""
+
+    def __init__(
+        self,
+        link: LinkClient,
+        live: Channel,
+        ways: WayDesk,
+        lane: Lane,
+        pages: Pages,
+        server: Callable[[], Operator],
+    ) -> None:
+        """``ways``: gathers what is judged by; ``server``: in whose name it is asked for without a pilot."""
+        self._link, self._live, self._ways, self._lane, self._pages = link, live, ways, lane, pages
+        self._server = server
+        self._asked: HomeAskedDoc | None = None
+        self._asked_mono_s = 0.0
+        self._is_judging = self._is_judging_return = False
+        self._judged: _Judged | None = None
+        self._told = HomeState()
+        self._moved = asyncio.Event()
+
+    @property
+    def state(self) -> HomeState:
+        return HomeState(
+            asked=self._asked,
+            is_judging=self._is_judging,
+            ret=None if self._judged is None else self._judged.doc,
+            is_judging_return=self._is_judging_return,
+        )
+
+    async def judge(self, operator: Operator, body: HomeBody) -> HomeState:
+        """Nothing is set. Raises what the vehicle said, NotAllowedError, NotReadyError."""
+        if self._is_judging:
+            raise ConflictError("Another home is being judged.", advice="Wait until it is done.")
+        self._asked, self._is_judging = None, True
+        self._tell()
+        try:
+            asked = await self._ways.asked(operator, ANYWHERE)
+            place = None if body.place is None else (body.place.lat_deg, body.place.lon_deg)
+            judged: HomeJudged = await self._lane.call(judge_home, asked, place)
+            self._asked, self._asked_mono_s = self._doc(judged, asked.state, is_here=place is None), time.monotonic()
+        finally:
+            self._is_judging = False
+            self._tell()
+        return self.state
+
+    async def set(self, operator: Operator, body: SetHomeBody) -> None:
+        """Raises NotFoundError, CheckNeededError, and what the vehicle said."""
+        asked = self._asked
+        if asked is None or asked.id != body.id:
+            raise NotFoundError("Another home was judged meanwhile.", advice="Ask for it again.")
+        if time.monotonic() - self._asked_mono_s > CHECK_FRESH_S:
+            what = f"That home was judged more than {CHECK_FRESH_S:.0f} s ago."
+            raise CheckNeededError(what, advice="Ask for it again.")
+        await self._link.call(SetHome(operator, asked.lat_deg, asked.lon_deg, asked.alt_amsl_m))
+        if self._asked is asked:
+            self._asked = None
+        self._tell()
+
+    def drop(self) -> HomeState:
+        """What was judged is put away."""
+        self._asked = None
+        self._tell()
+        return self.state
+
+    def on_state(self, state: VehicleState) -> None:
+        """Home that has moved in flight is judged at once."""
+        home = home_of(state)
+        if not (state.armed and is_in_the_air(state)) or home is None:
+            if self._judged is not None and not state.armed:
+                self._judged = None
+                self._tell()
+            return
+        if self._judged is not None:
+            if not is_there(home, self._judged.home):
+                self._moved.set()
+            return
+        before = home_of_takeoff(self._live.track.states)
+        if before is not None and not is_there(home, before):
+            self._moved.set()
+
+    def forget(self) -> None:
+        """Another vehicle, or none."""
+        self._asked = self._judged = None
+        self._moved.clear()
+        self._tell()
+
+    async def run(self) -> None:
+        """Judges the return whenever home has moved, and again while the vehicle flies on."""
+        while True:
+            try:
+                async with asyncio.timeout(LOOK_EVERY_S):
+                    await self._moved.wait()
+            except TimeoutError:
+                if not self._is_due():
+                    continue
+            self._moved.clear()
+            await self._judge_return()
+
+    def _is_due(self) -> bool:
+        state, judged = self._live.state, self._judged
+        if judged is None or state is None or state.lat_deg is None or state.lon_deg is None or not state.armed:
+            return False
+        is_old = time.monotonic() - judged.doc.judged_mono_s > OLD_S
+        return is_old and apart_m(judged.at_deg, (state.lat_deg, state.lon_deg)) > FLOWN_M
+
+    async def _judge_return(self) -> None:
+        state = self._live.state
+        home = None if state is None else home_of(state)
+        if state is None or home is None:
+            return
+        self._is_judging_return = True
+        self._tell()
+        try:
+            asked = await self._ways.asked(self._server(), ANYWHERE)
+            doc: ReturnDoc = await self._lane.call(judge_return, asked)
+        except DescribedError as error:
+            reason = ReasonDoc(code="home", text=error.what, mend=error.advice)
+            doc = ReturnDoc(state="unknown", reasons=[reason], judged_mono_s=time.monotonic())
+        finally:
+            self._is_judging_return = False
+        now = self._live.state
+        if now is not None and now.armed:
+            self._judged = _Judged(home, (state.lat_deg or 0.0, state.lon_deg or 0.0), doc)
+            if not is_there(home_of(now), home):
+                self._moved.set()  # what was judged is out of date already
+        self._tell()
+
+    def _doc(self, judged: HomeJudged, state: VehicleState, *, is_here: bool) -> HomeAskedDoc:
+        home, now = judged.home, home_of(state)
+        moves_m = 0.0 if now is None else apart_m((now.lat_deg, now.lon_deg), (home.lat_deg, home.lon_deg))
+        rises_m = 0.0 if now is None else home.alt_amsl_m - now.alt_amsl_m
+        return HomeAskedDoc(
+            id=secrets.token_hex(8),
+            is_here=is_here,
+            lat_deg=home.lat_deg,
+            lon_deg=home.lon_deg,
+            alt_amsl_m=home.alt_amsl_m,
+            moves_m=moves_m,
+            rises_m=rises_m,
+            changes=_changes(rises_m, in_air=judged.ret is not None, has_mission=self._live.flight.way == "auto"),
+            ret=judged.ret,
+        )
+
+    def _tell(self) -> None:
+        if (state := self.state) != self._told:
+            self._told = state
+            self._pages.publish(HomeMessage(home=state))
+
+
+def _changes(rises_m: float, *, in_air: bool, has_mission: bool) -> list[str]:
+    """What a pilot must know before it is set."""
+    if not in_air:
+        return ["It stays there when the vehicle arms, until the vehicle is switched off."]
+    said = ["Return leads there, and every height counts from there."]
+    if has_mission:
+        shift = f"{abs(rises_m):.1f} m {'higher' if rises_m > 0 else 'lower'} than certified"
+        said.append(f"The mission on board would be {shift}: it goes on only once its rest is certified from here.")
+    return said

@@ -1,0 +1,190 @@
+"""Home at the desk: judged over the open model, set as it was judged, and Return judged anew once home has moved."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from mapping.geometry.frames import moved_deg
+from server.errors import CheckNeededError, NotFoundError
+from server.flying.in_flight.home_desk import HomeDesk
+from server.flying.in_flight.way_desk import WayDesk
+from server.heard.channel import Channel
+from server.schemas import HomeAskedDoc, HomeBody, HomeState, SetHomeBody
+from server.schemas.flight_docs import CHECK_FRESH_S
+from server.work.jobs import Lane
+from telemetry.errors import NotAllowedError
+from telemetry.flight.home_watch import home_of
+from telemetry.topics.obstacles import SENSORS
+from telemetry.topics.requests import SetHome
+from telemetry.topics.vehicle import VehicleState
+from tests.server.fakes import Told
+from tests.server.flying_desk_bench import ME, Made, Vehicle
+
+pytestmark = pytest.mark.xdist_group("flying-desk")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Made]:
+    made = Made(tmp_path_factory.mktemp("data"))
+    yield made
+    made.library.close()
+
+
+@pytest.fixture(scope="module")
+def runner() -> Iterator[asyncio.Runner]:
+    with asyncio.Runner() as made:
+        yield made
+
+
+@pytest.fixture(scope="module")
+def lane(runner: asyncio.Runner) -> Iterator[Lane]:
+    lane = Lane("flight")
+    yield lane
+    runner.run(lane.close())
+
+
+class Bench:
+    """A vehicle that took off at the plan's home and hovers 30 m above it."""
+
+    def __init__(self, made: Made, lane: Lane, *, up_m: float = 30.0) -> None:
+        self.made, self.vehicle, self.document = made, Vehicle(), made.document
+        self.told: list[HomeState] = []
+        me: Any = self
+        self.live = Channel("live", Told())
+        stands, now_s = made.standing(), time.monotonic()
+        flies = {"armed": True, "landed": "in_air", "alt_rel_home_m": up_m} if up_m else {}
+        self.live.state = replace(stands, position_t_mono_s=now_s, gnss_t_mono_s=now_s, **flies)
+        self.live.track.states = [stands, self.live.state]
+        self.mirrors: dict[str, Any] = {name: SimpleNamespace(origin=None) for name in SENSORS}
+        ways = WayDesk(me.vehicle, self.live, me, made.library, lane, me, Told())
+        self.desk = HomeDesk(me.vehicle, self.live, ways, lane, me, lambda: ME)
+
+    def publish(self, message: Any) -> None:
+        self.told.append(message.home)
+
+    @property
+    def state(self) -> VehicleState:
+        assert self.live.state is not None
+        return self.live.state
+
+    def moves(self, east_m: float, up_m: float = 0.0) -> None:
+        """Home, by whomever."""
+        home = home_of(self.state)
+        assert home is not None
+        lat_deg, lon_deg = moved_deg((home.lat_deg, home.lon_deg), east_m, 0.0)
+        told = {"home_lat_deg": lat_deg, "home_lon_deg": lon_deg, "home_alt_amsl_m": home.alt_amsl_m + up_m}
+        self.live.state = replace(self.state, position_t_mono_s=time.monotonic(), **told)
+        self.desk.on_state(self.state)
+
+    async def asked(self, east_m: float | None = None) -> HomeAskedDoc:
+        place = None
+        if east_m is not None:
+            there = self.made.standing(east_m=east_m)
+            place = {"lat_deg": there.lat_deg, "lon_deg": there.lon_deg}
+        doc = (await self.desk.judge(ME, HomeBody.model_validate({"place": place}))).asked
+        assert doc is not None
+        return doc
+
+
+async def shows(there: Callable[[], object]) -> None:
+    async with asyncio.timeout(60.0):
+        while not there():
+            await asyncio.sleep(0.02)
+
+
+def test_home_there_lies_on_the_models_ground_and_is_set_as_it_was_judged(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        doc, there = await bench.asked(20.0), made.standing(east_m=20.0)
+        home = home_of(bench.state)
+        assert home is not None
+        assert there.alt_amsl_m is not None
+        assert doc.moves_m == pytest.approx(20.0, abs=0.1)
+        assert doc.rises_m == pytest.approx(there.alt_amsl_m - home.alt_amsl_m, abs=0.05)
+        assert doc.ret is not None
+        assert doc.ret.state in ("certified", "not_certified")
+        assert [state.is_judging for state in bench.told] == [True, False]
+        with pytest.raises(NotFoundError, match="Another home"):
+            await bench.desk.set(ME, SetHomeBody(id="another"))
+        assert bench.vehicle.told == []
+        await bench.desk.set(ME, SetHomeBody(id=doc.id))
+        assert bench.vehicle.told == [SetHome(ME, doc.lat_deg, doc.lon_deg, doc.alt_amsl_m)]
+        assert bench.desk.state.asked is None
+
+    runner.run(scenario())
+
+
+def test_what_was_judged_long_ago_is_not_set(
+    made: Made, lane: Lane, runner: asyncio.Runner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane, up_m=0.0)
+        doc = await bench.asked()
+        assert (doc.is_here, doc.ret) == (True, None)
+        assert "stays there when the vehicle arms" in doc.changes[0]
+        later_s = time.monotonic() + CHECK_FRESH_S + 1.0
+        monkeypatch.setattr(time, "monotonic", lambda: later_s)
+        with pytest.raises(CheckNeededError):
+            await bench.desk.set(ME, SetHomeBody(id=doc.id))
+        assert bench.vehicle.told == []
+
+    runner.run(scenario())
+
+
+def test_home_is_not_where_the_model_knows_no_ground_nor_on_a_height_that_nobody_knows(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        with pytest.raises(NotAllowedError, match="Home cannot be there: the surface model ends"):
+            await bench.desk.judge(ME, HomeBody.model_validate({"place": {"lat_deg": 37.0, "lon_deg": 14.0}}))
+        assert not bench.desk.state.is_judging
+        bench.moves(0.0, up_m=-8.0)
+        with pytest.raises(NotAllowedError, match=r"8\.0 m below the ground"):
+            await bench.asked(20.0)
+        stands = Bench(made, lane, up_m=0.0)
+        stands.live.state = replace(stands.state, gnss_alt_amsl_m=(stands.state.alt_amsl_m or 0.0) - 6.0,
+                                    vertical_accuracy_m=0.02)  # fmt: skip
+        with pytest.raises(NotAllowedError, match="By its receiver"):
+            await stands.asked()
+
+    runner.run(scenario())
+
+
+def test_a_home_that_moved_has_its_return_judged_without_anybody_asking(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        judging = asyncio.ensure_future(bench.desk.run())
+        try:
+            bench.desk.on_state(bench.state)
+            bench.moves(0.4)
+            assert bench.desk.state == HomeState(), "it wanders"
+            bench.moves(20.0)
+            await shows(lambda: bench.desk.state.ret)
+            first = bench.desk.state.ret
+            assert first is not None
+            assert any(state.is_judging_return for state in bench.told)
+            bench.moves(-400.0)
+            await shows(lambda: bench.desk.state.ret not in (None, first))
+            newest = bench.desk.state.ret
+            assert newest is not None
+            assert newest.state != "certified"
+            assert newest.reasons
+            bench.live.state = replace(bench.state, armed=False, landed="on_ground")
+            bench.desk.on_state(bench.state)
+            assert bench.desk.state.ret is None
+        finally:
+            judging.cancel()
+
+    runner.run(scenario())
