@@ -1735,6 +1735,56 @@ export interface GuidedState {
   is_judging: boolean;
 }
 
+/** Where home shall be; it is judged, not set. */
+export interface HomeBody {
+  /** null: where the vehicle is. */
+  place?: PlaceDoc | null;
+}
+
+/** The home that was judged last is set. */
+export interface SetHomeBody {
+  id: string;
+}
+
+/** The vehicle's own return, from where it was when this was judged. */
+export interface ReturnDoc {
+  /** unknown: it could not be judged; the reason says why. */
+  state: "certified" | "not_certified" | "unknown";
+  reasons: ReasonDoc[];
+  /** Smallest distance to the surface; null: nothing is near, or not judged. */
+  clearance_m: number | null;
+  /** A guided way home is certified where the return is not. */
+  instead: boolean;
+  /** By the server's clock. */
+  judged_mono_s: number;
+}
+
+/** A home that may be set, and what that changes. */
+export interface HomeAskedDoc {
+  id: string;
+  is_here: boolean;
+  lat_deg: number;
+  lon_deg: number;
+  /** By the vehicle's own heights above the sea. */
+  alt_amsl_m: number;
+  /** From home as it is. */
+  moves_m: number;
+  rises_m: number;
+  /** Sentences. */
+  changes: string[];
+  /** From there; null: the vehicle stands on the ground. */
+  ret: ReturnDoc | null;
+}
+
+/** What is in hand of home. */
+export interface HomeState {
+  asked: HomeAskedDoc | null;
+  is_judging: boolean;
+  /** Since home was moved in flight; null: it was not. */
+  ret: ReturnDoc | null;
+  is_judging_return: boolean;
+}
+
 /** From the first waypoint to the last. */
 export interface ReviewFigures {
   completed: boolean;
@@ -2624,6 +2674,13 @@ export interface GuidedMessage {
   guided: GuidedState;
 }
 
+/** Home that is to be set, and the vehicle's own return since it was moved. */
+export interface HomeMessage {
+  v: 1;
+  type: "home";
+  home: HomeState;
+}
+
 export interface LeaseMessage {
   v: 1;
   type: "lease";
@@ -2823,6 +2880,7 @@ export type ServerMessage =
   | FlightMessage
   | FlyMessage
   | GuidedMessage
+  | HomeMessage
   | LeaseMessage
   | MeMessage
   | HealthMessage

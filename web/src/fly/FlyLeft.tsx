@@ -9,6 +9,7 @@ import { Icon } from "../ui/Icon";
 import { ConnectionSection } from "./Connection";
 import { FlightSection } from "./FlightSection";
 import { GuidedSection } from "./GuidedSection";
+import { HomeSection } from "./HomeSection";
 import { NextAction } from "./NextAction";
 import { OnboardSection } from "./Onboard";
 import { ParametersSection } from "./ParametersSection";
@@ -79,10 +80,12 @@ export function FlyLeft() {
         <ConnectionSection key={adopted.value && !hasTrouble ? "used" : "open"} />
         {isInAir.value && <FlightSection />}
         {isInAir.value && <GuidedSection />}
+        {isInAir.value && <HomeSection />}
         <OnboardSection />
         <PreflightSection />
         {!isInAir.value && <FlightSection />}
         {!isInAir.value && <GuidedSection />}
+        {!isInAir.value && <HomeSection />}
         <ObstaclesSection />
         <TrafficSection />
         <ParametersSection />

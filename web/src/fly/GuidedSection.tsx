@@ -4,13 +4,14 @@ import { adopted, flight, isInAir } from "../store/flying";
 import { guided } from "../store/guided";
 import { pending } from "../store/outcomes";
 import { whyNotCommand } from "../store/reach";
-import { document_, selection } from "../store/state";
+import { document_ } from "../store/state";
 import { Button, Segmented } from "../ui/Button";
 import { HoldButton } from "../ui/HoldButton";
 import { Icon } from "../ui/Icon";
 import { NumberField } from "../ui/NumberField";
 import { Done } from "../ui/Outcome";
 import { Section } from "../ui/Section";
+import { aimsFor } from "../vehicle/aiming";
 import {
   GUIDED,
   action,
@@ -122,7 +123,7 @@ function Fields({ asked }: { asked: WayAction }) {
 /** What is wanted: nothing moves before it is judged. */
 function Wish() {
   const asked: WayAction = isInAir.value ? action.value : "take_off";
-  const isAiming = selection.value.tool === "there";
+  const isAiming = aimsFor() === "way";
   const hasTerrain = Boolean(document_.value?.terrain_id);
   const why = whyNotCommand.value ?? (hasTerrain ? null : "Open a surface model in Plan first");
   const isBusy = pending.value.has(GUIDED) || guided.value.is_judging;

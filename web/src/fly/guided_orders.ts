@@ -1,10 +1,9 @@
-import { effect, signal } from "@preact/signals";
+import { signal } from "@preact/signals";
 import { LIMITS, type FlyWayBody, type PlaceDoc, type WayBody } from "../messages";
 import { guided } from "../store/guided";
 import { order } from "../store/outcomes";
-import { document_, selection } from "../store/state";
-import { setSelection } from "../store/stream";
-import { drawer } from "../store/view";
+import { document_ } from "../store/state";
+import { aim } from "../vehicle/aiming";
 
 /** Everything that is asked of guided flight from this page. */
 
@@ -59,23 +58,7 @@ export const setWaySpeed = (value_m_s: number) =>
     done: "The speed is changed.",
   });
 
-/** This page has the tool in hand, so that it, and no other page, asks for the way to where it was clicked. */
-const isAiming = signal(false);
-
-export function takeAim(): void {
-  if (selection.value.tool === "there") {
-    setSelection({ tool: "select" });
-    return;
-  }
-  isAiming.value = true;
-  setSelection({ tool: "there", poi_id: null, fence_mark: null, place: null });
-  // On narrow screens the drawer would cover what is to be clicked.
-  drawer.value = null;
-}
-
-effect(() => {
-  const { tool, place } = selection.value;
-  if (tool === "there" || !isAiming.peek()) return;
-  isAiming.value = false;
-  if (place && !guided.peek().is_judging) void ask(action.peek(), place);
-});
+export const takeAim = () =>
+  aim("way", (place) => {
+    if (!guided.peek().is_judging) void ask(action.peek(), place);
+  });

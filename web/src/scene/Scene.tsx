@@ -9,6 +9,7 @@ import { ViewTools } from "./ViewTools";
 import { AlertBanner } from "../obstacles/AlertBanner";
 import { markTitle } from "../store/fence";
 import { viewId } from "../store/view";
+import { aimsFor } from "../vehicle/aiming";
 import { review } from "../store/review";
 import { document_, pageId, selection, terrain, view } from "../store/state";
 import { hasTraversability } from "../store/traversability";
@@ -48,7 +49,7 @@ function chosenTitle(): string | null {
 
 function ToolHint() {
   const { tool, draft } = selection.value;
-  const hint = HINTS[tool];
+  const hint = tool === "there" && aimsFor() === "home" ? HINTS.home : HINTS[tool];
   if (!terrain.value) return null;
   const chosen = tool === "select" ? chosenTitle() : null;
   if (chosen) return <MoveHint title={chosen} />;

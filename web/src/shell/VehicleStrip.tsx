@@ -9,6 +9,7 @@ import {
   modeWord,
   nodeWord,
 } from "../vehicle/vehicle_words";
+import { returnTitle } from "../vehicle/return_words";
 import { wayInUse } from "../vehicle/way_words";
 import {
   adopted,
@@ -71,7 +72,7 @@ function Safety() {
         kind="return"
         place={SAFETY}
         disabled={!mayCommand}
-        title={why ?? "Return home and land"}
+        title={why ?? returnTitle() ?? "Return home and land"}
         testid="return-home"
         onHold={() => void returnHome()}
       />

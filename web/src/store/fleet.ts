@@ -3,6 +3,7 @@ import type { ActiveMessage, FleetMessage, VehicleDoc } from "../messages";
 import { standing } from "../net/api";
 import { forgetFlying } from "./flying";
 import { forgetGuided } from "./guided";
+import { forgetHome } from "./home";
 import { forgetMoving } from "./moving";
 import { forgetObstacles, forgetSensing } from "./obstacles";
 import { forgetOrders } from "./outcomes";
@@ -23,6 +24,7 @@ export function takeActive({ vehicle }: ActiveMessage): void {
     forgetObstacles("live");
     forgetMoving("live");
     forgetGuided();
+    forgetHome();
     forgetOrders();
     active.value = vehicle;
   });

@@ -2,6 +2,7 @@ import { batch } from "@preact/signals";
 import type { ServerMessage } from "../messages";
 import { fly, flight, heard, linkStatus, nodes, recorder, transfer } from "./flying";
 import { forgetGuided } from "./guided";
+import { forgetHome } from "./home";
 import { forgetObstacles, forgetSensing } from "./obstacles";
 import { forgetMoving } from "./moving";
 import { replay, review } from "./review";
@@ -19,6 +20,7 @@ const FORGET: Partial<Record<string, () => void>> = {
   transfer: () => (transfer.value = null),
   fly: () => (fly.value = null),
   guided: forgetGuided,
+  home: forgetHome,
   nodes: () => (nodes.value = []),
   recorder: () => (recorder.value = null),
   review: () => (review.value = null),

@@ -5,6 +5,7 @@ import { takeActive, takeFleet } from "./fleet";
 import { takeFlying } from "./flying";
 import { takeSensing } from "./obstacles";
 import { guided } from "./guided";
+import { home } from "./home";
 import { queue, showPlan } from "./plan";
 import { confirm, forgetUnconfirmed } from "./reconnect";
 import { takeReviewing } from "./review";
@@ -79,6 +80,9 @@ export function receive(message: ServerMessage): void {
       return;
     case "guided":
       guided.value = message.guided;
+      return;
+    case "home":
+      home.value = message.home;
       return;
     case "recordings":
     case "review":

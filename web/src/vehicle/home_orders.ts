@@ -1,0 +1,20 @@
+import type { HomeBody, PlaceDoc } from "../messages";
+import { order } from "../store/outcomes";
+import { aim } from "./aiming";
+
+/** Everything that is asked of home from this page. */
+
+export const HOME = "home";
+
+/** Nothing is set yet: the place is judged, and shown to all pages. Without a place it is the vehicle's own. */
+export async function askHome(place: PlaceDoc | null = null): Promise<void> {
+  const body: HomeBody = { place };
+  await order({ place: HOME, method: "PUT", path: "/api/flight/home", body });
+}
+
+export const aimAtHome = () => aim("home", (place) => void askHome(place));
+
+export const setHome = (id: string) =>
+  order({ place: HOME, path: "/api/flight/home/set", body: { id }, moves: true, done: "Home is set." });
+
+export const putHomeAway = () => order({ place: HOME, method: "DELETE", path: "/api/flight/home" });
