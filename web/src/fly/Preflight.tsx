@@ -20,26 +20,13 @@ import {
 } from "../vehicle/orders";
 import { checklistObstacle } from "../store/checklist";
 import { Checklist } from "./Checklist";
-import { openChecks, unaccepted } from "./next_step";
+import { ROW_TITLES, openChecks, unaccepted } from "./next_step";
 
 const MARKS: Record<CheckRow["state"], { icon: IconName; word: string }> = {
   good: { icon: "check", word: "Good" },
   accept: { icon: "warning", word: "Accept?" },
   bad: { icon: "cross", word: "Not so" },
   unknown: { icon: "question", word: "Unknown" },
-};
-
-const TITLES: Record<CheckRow["code"], string> = {
-  mission: "Mission",
-  clearance: "Clearance",
-  home: "Home",
-  gnss: "GNSS",
-  rtl_height: "Return height",
-  battery: "Battery",
-  ready: "Ready to arm",
-  avoidance: "Avoidance",
-  fence: "Fence",
-  others: "Other vehicles",
 };
 
 function Row({ row }: { row: CheckRow }) {
@@ -52,7 +39,7 @@ function Row({ row }: { row: CheckRow }) {
       <Icon name={icon} />
       <div>
         <p class="check-head">
-          <strong>{TITLES[row.code]}</strong>
+          <strong>{ROW_TITLES[row.code]}</strong>
           <span class="check-word">{state === "accept" && isAccepted ? "Accepted" : word}</span>
         </p>
         <p>{row.text}</p>

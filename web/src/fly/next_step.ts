@@ -40,6 +40,21 @@ export const openChecks = (rows: readonly CheckRow[]) =>
 export const unaccepted = (rows: readonly CheckRow[], accepted: ReadonlySet<Accepted>) =>
   rows.filter((row) => row.state === "accept" && !(isAcceptable(row.code) && accepted.has(row.code)));
 
+export const ROW_TITLES: Record<CheckRow["code"], string> = {
+  mission: "Mission",
+  clearance: "Clearance",
+  home: "Home",
+  gnss: "GNSS",
+  rtl_height: "Return height",
+  battery: "Battery",
+  ready: "Ready to arm",
+  avoidance: "Avoidance",
+  fence: "Fence",
+  others: "Other vehicles",
+};
+
+const titles = (rows: readonly CheckRow[]) => rows.map((row) => ROW_TITLES[row.code]).join(", ");
+
 /** A connection that waits is given its time; the simulator stays at hand above. */
 function connecting(link: LinkStatus | null): Step {
   if (link?.candidates.length) return { id: "adopt" };
@@ -71,9 +86,11 @@ function onGround(facts: Facts): Step {
   const rows = fly?.preflight?.rows;
   if (!rows) return { id: "check" };
   if (facts.check_age_s > CHECK_FRESH_S) return { id: "check", why: "The check is older than two minutes" };
-  if (openChecks(rows).length > 0) return { id: "check", why: "Mend what stands above, then check again" };
-  const left = unaccepted(rows, accepted).length;
-  if (left > 0) return { id: "start", why: "Tick what you accept first" };
+  const open = openChecks(rows);
+  if (open.length > 0)
+    return { id: "check", why: `Mend what stands above, then check again: ${titles(open)}` };
+  const left = unaccepted(rows, accepted);
+  if (left.length > 0) return { id: "start", why: `Tick what you accept first: ${titles(left)}` };
   const unticked = checklistObstacle(fly?.checklist);
   return unticked === null ? { id: "start" } : { id: "start", why: unticked };
 }
