@@ -86,7 +86,7 @@ def test_a_fence_on_board_is_kept_without_flying(link: str, dsm: Path, tmp_path:
     assert hedgehop("fence", link, "upload", file).code == 0
     assert goto(link, dsm, "take-off", "--height-m", 6).code == 0
     refused = goto(link, dsm, "to", at(130.5), "--height-m", 6, ON_GROUND)
-    assert (refused.code, refused.json["flown"], refused.json["problem"]) == (1, False, "way")
+    assert (refused.code, refused.json["flown"], refused.json["problem"]) == (1, False, "return")
     assert "exclusion" in refused.json["reasons"][0]
     assert goto(link, dsm, "home", "--height-m", 5, ON_GROUND).code == 0
 

@@ -50,6 +50,10 @@ def lane(runner: asyncio.Runner) -> Iterator[Lane]:
     runner.run(lane.close())
 
 
+LONG_S = 600.0
+"""Positions are of now for so long: a busy machine judges slowly."""
+
+
 class Bench:
     """A vehicle that took off at the plan's home and hovers 30 m above it."""
 
@@ -58,7 +62,7 @@ class Bench:
         self.told: list[HomeState] = []
         me: Any = self
         self.live = Channel("live", Told())
-        stands, now_s = made.standing(), time.monotonic()
+        stands, now_s = made.standing(), time.monotonic() + LONG_S
         flies = {"armed": True, "landed": "in_air", "alt_rel_home_m": up_m} if up_m else {}
         self.live.state = replace(stands, position_t_mono_s=now_s, gnss_t_mono_s=now_s, **flies)
         self.live.track.states = [stands, self.live.state]
@@ -80,7 +84,7 @@ class Bench:
         assert home is not None
         lat_deg, lon_deg = moved_deg((home.lat_deg, home.lon_deg), east_m, 0.0)
         told = {"home_lat_deg": lat_deg, "home_lon_deg": lon_deg, "home_alt_amsl_m": home.alt_amsl_m + up_m}
-        self.live.state = replace(self.state, position_t_mono_s=time.monotonic(), **told)
+        self.live.state = replace(self.state, **told)
         self.desk.on_state(self.state)
 
     async def asked(self, east_m: float | None = None) -> HomeAskedDoc:

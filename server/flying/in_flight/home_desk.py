@@ -16,6 +16,7 @@ from mapping.geometry.frames import apart_m
 from server.errors import CheckNeededError, ConflictError, NotFoundError
 from server.flying.in_flight.home_task import HomeJudged, judge_home, judge_return
 from server.flying.in_flight.way_desk import WayDesk
+from server.flying.in_flight.way_task import WayAsked
 from server.heard.channel import Channel
 from server.schemas import (
     HomeAskedDoc,
@@ -71,6 +72,10 @@ class HomeDesk:
         self._asked_mono_s = 0.0
         self._is_judging = self._is_judging_return = False
         self._judged: _Judged | None = None
+        self._heard: HomePlace | None = None
+        """Home that was heard first in this flight."""
+        self._gathered: WayAsked | None = None
+        """What was read from the vehicle in this flight: it is not read again for each judgement."""
         self._told = HomeState()
         self._moved = asyncio.Event()
 
@@ -90,7 +95,7 @@ class HomeDesk:
         self._asked, self._is_judging = None, True
         self._tell()
         try:
-            asked = await self._ways.asked(operator, ANYWHERE)
+            asked = self._gathered = await self._ways.asked(operator, ANYWHERE)
             place = None if body.place is None else (body.place.lat_deg, body.place.lon_deg)
             judged: HomeJudged = await self._lane.call(judge_home, asked, place)
             self._asked, self._asked_mono_s = self._doc(judged, asked.state, is_here=place is None), time.monotonic()
@@ -122,21 +127,21 @@ class HomeDesk:
         """Home that has moved in flight is judged at once."""
         home = home_of(state)
         if not (state.armed and is_in_the_air(state)) or home is None:
-            if self._judged is not None and not state.armed:
-                self._judged = None
+            if not state.armed and self._heard is not None:
+                self._judged = self._heard = self._gathered = None
                 self._tell()
             return
+        self._heard = self._heard or home_of_takeoff(self._live.track.states) or home
         if self._judged is not None:
             if not is_there(home, self._judged.home):
                 self._moved.set()
             return
-        before = home_of_takeoff(self._live.track.states)
-        if before is not None and not is_there(home, before):
+        if not is_there(home, self._heard):
             self._moved.set()
 
     def forget(self) -> None:
         """Another vehicle, or none."""
-        self._asked = self._judged = None
+        self._asked = self._judged = self._heard = self._gathered = None
         self._moved.clear()
         self._tell()
 
@@ -156,8 +161,9 @@ class HomeDesk:
         state, judged = self._live.state, self._judged
         if judged is None or state is None or state.lat_deg is None or state.lon_deg is None or not state.armed:
             return False
-        is_old = time.monotonic() - judged.doc.judged_mono_s > OLD_S
-        return is_old and apart_m(judged.at_deg, (state.lat_deg, state.lon_deg)) > FLOWN_M
+        if time.monotonic() - judged.doc.judged_mono_s <= OLD_S:
+            return False
+        return judged.doc.state == "unknown" or apart_m(judged.at_deg, (state.lat_deg, state.lon_deg)) > FLOWN_M
 
     async def _judge_return(self) -> None:
         state = self._live.state
@@ -167,7 +173,8 @@ class HomeDesk:
         self._is_judging_return = True
         self._tell()
         try:
-            asked = await self._ways.asked(self._server(), ANYWHERE)
+            asked = self._gathered or await self._ways.asked(self._server(), ANYWHERE)
+            self._gathered = asked = await self._ways.renewed(asked)
             doc: ReturnDoc = await self._lane.call(judge_return, asked)
         except DescribedError as error:
             reason = ReasonDoc(code="home", text=error.what, mend=error.advice)

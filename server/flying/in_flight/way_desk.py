@@ -174,6 +174,19 @@ class WayDesk:
             home_of_takeoff(self._live.track.states),
         )
 
+    async def renewed(self, asked: WayAsked) -> WayAsked:
+        """What is seen and heard by now; what the vehicle holds was read for ``asked``."""
+        return replace(
+            asked,
+            terrain=self._library.terrain_dir(self._terrain().id),
+            document=self._workspace.document,
+            maps=await asyncio.to_thread(seen_maps, self._watch),
+            state=self._vehicle(),
+            now_mono_s=time.monotonic(),
+            flown=flown_places(self._live.track.states),
+            took_off=home_of_takeoff(self._live.track.states),
+        )
+
     # How
 
     def _check_still(self, vehicle: str | None, flown: _InHand | None) -> None:
