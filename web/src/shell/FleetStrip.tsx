@@ -51,11 +51,13 @@ function Vehicle({ vehicle }: { vehicle: VehicleDoc }) {
 function Elsewhere() {
   const [first, ...others] = calling.value;
   if (!first) return null;
+  const text = first.alarm?.text ?? "";
   return (
     <p class="fleet-alarm" role="alert" data-testid="fleet-alarm">
       <Icon name="warning" size={20} />
       <span>
-        <strong>{first.name}:</strong> {first.alarm?.text}
+        {!text.startsWith(`${first.name} `) && <strong>{first.name}: </strong>}
+        {text}
         {others.length > 0 && ` See also: ${others.map(({ name }) => name).join(", ")}.`}
       </span>
       {first.number !== active.value && (
