@@ -51,7 +51,7 @@ function Asked({ asked }: { asked: HomeAskedDoc }) {
   const height =
     rises_m < 0.05 ? "as high" : `${metres(rises_m, 1)} ${asked.rises_m > 0 ? "higher" : "lower"}`;
   return (
-    <div class="way-card" role="group" aria-label="Home" data-testid="home-card">
+    <div class="way-card home-card" role="group" aria-label="Home" data-testid="home-card">
       <strong class="way-verdict">
         <Icon name="home" size={16} /> {asked.is_here ? "Home here" : "Home there"}
         <span class="muted">
