@@ -21,7 +21,7 @@ def test_the_state_is_a_snapshot(served: Running) -> None:
 
 def test_an_edit_comes_back_and_reaches_the_other_pages(served: Running) -> None:
     with served.socket() as socket:
-        assert json.loads(socket.recv(timeout=10))["type"] == "snapshot"
+        assert json.loads(socket.recv(timeout=60))["type"] == "snapshot"
         edit = {"base_revision": 1, "label": "Rename", "document": {"name": "<b>&\u0007"}}
         response = served.http.put("/api/plan", json=edit)
         # Markup stays text; control characters go.
@@ -94,7 +94,7 @@ def test_only_known_files_are_exported(served: Running, file: str) -> None:
 
 def test_the_stream_answers_faulty_messages_and_hides_details(served: Running) -> None:
     with served.socket() as socket:
-        socket.recv(timeout=10)
+        socket.recv(timeout=60)
         socket.send('{"type": "launch"}')
         assert "launch" in _next(socket, "notice")["error"]["what"]
         for poi, code in (("refused", "not_ready"), ("broken", "internal")):
@@ -111,6 +111,6 @@ def test_the_stream_answers_faulty_messages_and_hides_details(served: Running) -
 def _next(socket: Connection, kind: str) -> dict[str, Any]:
     """What is told of other matters meanwhile, such as who is in charge, is passed over."""
     while True:
-        message = json.loads(socket.recv(timeout=10))
+        message = json.loads(socket.recv(timeout=60))
         if message["type"] == kind:
             return message

@@ -82,7 +82,7 @@ def test_signing_out_closes_the_sockets_of_the_session(served: Running) -> None:
         client.post("/api/session", json={"password": PASSWORD})
         name = f"hedgehop-{served.settings.port}"
         with served.socket(additional_headers={"Cookie": f"{name}={client.cookies[name]}"}) as socket:
-            socket.recv(timeout=10)
+            socket.recv(timeout=60)
             client.delete("/api/session")
             with pytest.raises(ConnectionClosed) as closed:
                 read_on(socket)
@@ -106,6 +106,6 @@ def test_a_socket_without_a_session_closes_with_4401(served: Running, cookie: st
         ) as socket,
         pytest.raises(ConnectionClosed) as closed,
     ):
-        socket.recv(timeout=10)
+        socket.recv(timeout=60)
     assert closed.value.rcvd is not None
     assert closed.value.rcvd.code == CLOSE_SIGNED_OUT

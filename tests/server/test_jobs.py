@@ -85,7 +85,7 @@ def test_cancel_ends_the_call_at_once_and_the_lane_goes_on(with_lane):
         await asyncio.wait_for(started.wait(), 30)
         lane.cancel()
         with pytest.raises(JobCancelledError):
-            await asyncio.wait_for(task, 10)
+            await asyncio.wait_for(task, 60)
         return await lane.call(_double, 3)
 
     assert with_lane(use) == 6

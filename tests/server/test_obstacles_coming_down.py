@@ -108,7 +108,10 @@ class Link:
         self.watch.on_avoidance(replace(HIGHER, height_offset_m=0.0))
 
 
-def run(answer: RestPlanned, *, comes_down: bool = True, error: Exception | None = None) -> tuple[Watch, list[Any]]:
+def run(
+    answer: RestPlanned, *, comes_down: bool = True, error: Exception | None = None, rounds: int = 3
+) -> tuple[Watch, list[Any]]:
+    """After so many rounds: one in which it stays higher is followed by a long pause."""
     watch = Watch("live", Told())
     watch.on_settings(PerceptionSettings(comes_down=comes_down))
     watch.on_avoidance(HIGHER)
@@ -121,11 +124,20 @@ def run(answer: RestPlanned, *, comes_down: bool = True, error: Exception | None
     around: Any = SimpleNamespace(watch=watch, situation=object)
     lane: Any = SimpleNamespace(call=plan)
     lease: Any = SimpleNamespace(server_operator=lambda: Operator("server", 3))
-    down = ComingDown(around, cast(Any, link), lane, lease)
+    down, said = ComingDown(around, cast(Any, link), lane, lease), list[str]()
+    refresh = watch.refresh
+
+    def told() -> None:
+        said.append(watch.stays_higher)
+        refresh()
+
+    watch.refresh = told  # type: ignore[method-assign]
 
     async def whole() -> None:
         task = asyncio.ensure_future(down.run())
-        await asyncio.sleep(0.2)
+        async with asyncio.timeout(60):
+            while len(said) < rounds:
+                await asyncio.sleep(0.01)
         task.cancel()
         await asyncio.gather(task, return_exceptions=True)
 
@@ -151,6 +163,6 @@ def test_who_chose_to_stay_higher_does(planned: Planned) -> None:  # noqa: F811
 @pytest.mark.parametrize("error", [None, NotAllowedError("The way ahead is not seen to be clear.")])
 def test_why_it_stays_higher_is_told(error: Exception | None) -> None:
     answer = RestPlanned(why="The way ahead is not seen to be clear.") if error is None else RestPlanned(TARGETS)
-    watch, asked = run(answer, error=error)
+    watch, asked = run(answer, error=error, rounds=1)
     assert watch.state.stays_higher == "The way ahead is not seen to be clear."
     assert len(asked) == (error is not None)

@@ -118,6 +118,6 @@ def test_a_vehicle_flies_over_plain_ground_where_no_model_is_open() -> None:
 
 
 async def _until(condition: Any) -> None:
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(60):
         while not condition():
             await asyncio.sleep(0.01)

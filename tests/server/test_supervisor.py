@@ -1,11 +1,13 @@
 """The supervisor, with a node that is a few lines long: started, found again, started anew, ended."""
 
 import asyncio
+import itertools
 import os
 import signal
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -14,7 +16,7 @@ from server.work import node_process, supervisor
 from server.work.node_process import LOG_BYTES, bound_log
 from server.work.supervisor import NodeState, Supervisor
 from telemetry.bus.bus import Bus
-from telemetry.bus.liveness import HUNG_S, STARVED_S
+from telemetry.bus.liveness import HUNG_S, STARVED_S, Liveness
 from telemetry.bus.node_lock import NodeFacts, running_node, running_nodes
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -120,7 +122,9 @@ def test_a_node_is_started_in_a_session_of_its_own_and_stopped(folder: Path) -> 
             assert await watched.running("link") == facts
             await watched.supervisor.stop("link")
             assert running_node(folder, "link") is None
-            assert [states[0].state for states in watched.told] == ["starting", "running", "stopped"]
+            # On a busy machine it may be silent for a moment.
+            told = (states[0].state for states in watched.told if states[0].state != "silent")
+            assert [state for state, _ in itertools.groupby(told)] == ["starting", "running", "stopped"]
             await watched.supervisor.start("link", [])
             assert (await watched.running("link")).arguments == ("--runtime", str(folder))
             await watched.supervisor.stop("link")
@@ -324,7 +328,10 @@ def test_a_link_that_hangs_is_said_then_killed_and_started_again(
     run(whole)
 
 
-def test_a_node_that_is_silent_for_a_moment_goes_on(folder: Path) -> None:
+def test_a_node_that_is_silent_for_a_moment_goes_on(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # A busy machine may make more than the moment of it that is meant.
+    monkeypatch.setattr(supervisor, "Liveness", partial(Liveness, hung_s=PATIENCE_S))
+
     async def whole() -> None:
         async with supervised(folder) as watched:
             await watched.supervisor.start("link", [])
