@@ -11,6 +11,7 @@ from server.schemas import NodeDoc, NodesMessage, Pages
 from server.settings import DemoAutopilot
 from server.work.supervisor import NodeState, Supervisor
 from telemetry.bus.bus import Bus
+from telemetry.bus.liveness import START_S
 from telemetry.bus.node_lock import running_node
 from telemetry.topics.obstacles import SENSORS, Sensor
 from telemetry.topics.recording_requests import RecorderRequest, ReplayRequest, StartRecording
@@ -24,7 +25,7 @@ _SENSOR_SEED = 1
 _RETURN_HEIGHT: dict[DemoAutopilot, str] = {"ardupilot": "RTL_ALT={1:.0f}", "px4": "RTL_RETURN_ALT={0:.2f}"}
 """For metres and centimetres above home."""
 _CALL_TIMEOUT_S = 15.0
-"""A node may have to start first, on a busy machine."""
+"""Of a node that has been up, on a busy machine."""
 
 
 class Nodes:
@@ -80,11 +81,16 @@ class Nodes:
     async def ask_recorder(self, request: RecorderRequest) -> object:
         await self.recorder()
         result = str if isinstance(request, StartRecording) else type(None)
-        return await self._bus.call(RECORDER, request, result=result, timeout_s=_CALL_TIMEOUT_S)
+        return await self._bus.call(RECORDER, request, result=result, timeout_s=self._patience_s(RECORDER))
 
     async def ask_replay(self, request: ReplayRequest) -> object:
         await self.replay()
-        return await self._bus.call(REPLAY, request, result=type(None), timeout_s=_CALL_TIMEOUT_S)
+        return await self._bus.call(REPLAY, request, result=type(None), timeout_s=self._patience_s(REPLAY))
+
+    def _patience_s(self, name: str) -> float:
+        """One that is started for the first time may load for as long as its supervisor lets it."""
+        is_loading = any(node.name == name and node.state == "starting" for node in self.supervisor.states)
+        return _CALL_TIMEOUT_S + START_S if is_loading else _CALL_TIMEOUT_S
 
     async def sensor(self, sensor: Sensor) -> None:
         """A map, regions and alerts of what one sensor sends."""
