@@ -9,12 +9,14 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.stations import SimulatedVehicle, Station
-from tests.e2e.steps import connect, hold, open_demo, open_recording, return_home, upload, wait_until
+from tests.e2e.steps import check, connect, hold, open_demo, open_recording, return_home, upload
 from tests.server.station import ok
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
 PROFILE = "Generic quadrotor"
+IS_KEPT = re.compile("/api/checklist$")
+"""The answer to Save: what the page said of the one before may still stand there."""
 LIST = "# Vehicle\nPropellers are whole\nBattery is full\n# Place\nNobody is near\n"
 
 
@@ -27,23 +29,10 @@ def listed(station: Station) -> Iterator[Station]:
     ok(station.http.put("/api/checklist", json=body))
 
 
-def checked(page: Page) -> None:
-    """The vehicle is ready, by a check that is not too old, and the list stands under it."""
-    again, ready = page.get_by_test_id("next-check"), page.get_by_test_id("next-start")
-
-    def is_ready() -> bool:
-        if again.count() and again.is_enabled():
-            again.click()
-            expect(ready.or_(again).and_(page.locator(":enabled, [data-testid=next-start]"))).to_be_visible()
-        return bool(ready.count())
-
-    expect(again.or_(ready)).to_be_visible()
-    wait_until(page, is_ready)
-
-
 def saved(page: Page, text: str) -> None:
     page.get_by_test_id("checklist-text").fill(text)
-    page.get_by_test_id("checklist-save").click()
+    with page.expect_response(IS_KEPT):
+        page.get_by_test_id("checklist-save").click()
     expect(page.get_by_test_id("outcome-checklist-text")).to_contain_text("Saved")
 
 
@@ -69,13 +58,14 @@ def test_the_list_is_written_ticked_demanded_and_reviewed(
     saved(page, "")
     page.get_by_test_id("checklist-before").click()
     expect(text).to_have_value(LIST)
-    page.get_by_test_id("checklist-save").click()
+    with page.expect_response(IS_KEPT):
+        page.get_by_test_id("checklist-save").click()
     expect(page.get_by_test_id("checklist-changed")).to_contain_text(name)
     page.keyboard.press("Escape")
 
     connect(page, vehicle)
     upload(page)
-    checked(page)
+    check(page)
     expect(page.get_by_test_id("next-start")).to_be_disabled()
     expect(page.get_by_test_id("next-action")).to_contain_text("Tick the checklist first: 3 points")
     for number in (1, 2, 3):
@@ -96,7 +86,7 @@ def test_the_list_is_written_ticked_demanded_and_reviewed(
     for number in (1, 2, 3, 4):
         page.get_by_test_id(f"tick-{number}").check()
     expect(page.get_by_test_id("checklist-left")).to_have_text("all ticked")
-    checked(page)
+    check(page)
     hold(page, "next-start")
     expect(page.get_by_test_id("next-action")).to_have_attribute("data-step", "pause")
     return_home(page)

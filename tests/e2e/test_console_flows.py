@@ -14,7 +14,7 @@ from PIL import Image
 from playwright.sync_api import Page, expect
 
 from tests.e2e.stations import Station
-from tests.e2e.steps import certified, choose, click_surface, drawn, open_demo, visit, wait_until
+from tests.e2e.steps import certified, choose, click_surface, computed, drawn, open_demo, visit, wait_until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
@@ -134,6 +134,7 @@ def test_a_survey_under_an_orthophoto(station: Station, page_3d: Page, shared_da
     expect(page.get_by_test_id("photographed")).to_contain_text("of ")
     expect(page.get_by_test_id("front-overlap")).to_contain_text("of 80 % asked")
     expect(page.locator("[data-testid=reasons] [data-code=photos]")).to_have_count(0)
+    computed(page)
     before = page.get_by_test_id("length").inner_text()
     overlap = page.get_by_test_id("side-overlap-input")
     overlap.fill("85")
@@ -145,6 +146,7 @@ def test_plans_are_copied_opened_and_deleted(demo: Page) -> None:
     page, name, rows = demo, demo.get_by_test_id("plan-name"), demo.get_by_test_id("plan-row")
     first = name.input_value()
     page.get_by_test_id("plans-button").click()
+    expect(rows).not_to_have_count(0)
     before = rows.count()
     page.get_by_test_id("plan-save-as").click()
     page.get_by_test_id("save-as-name").fill("Second <b>try</b>")

@@ -33,6 +33,9 @@ def test_plan_upload_fly_review(station: Station, page: Page, vehicle: Simulated
     expect(page.get_by_test_id("chip-mode")).to_contain_text(re.compile(r"AUTO \d+/\d+"))
     expect(page.get_by_test_id("attitude")).to_have_attribute("aria-label", re.compile("Attitude: .* heading"))
     wait_until(page, lambda: percent(page) >= 5)
+    # It waits there for as long as a slow page needs to show all of it.
+    page.get_by_test_id("next-pause").click()
+    expect(page.get_by_test_id("next-resume")).to_be_visible()
     expect(page.get_by_test_id("cross-track")).to_contain_text(re.compile(r"\d\.\d\d\sm"))
     expect(page.get_by_test_id("vehicle-marker")).to_be_visible()
     expect(page.get_by_test_id("chip-rec")).to_contain_text("REC")
@@ -40,8 +43,6 @@ def test_plan_upload_fly_review(station: Station, page: Page, vehicle: Simulated
     expect(page.get_by_test_id("health-vibration")).to_have_attribute("data-level", "good")
     expect(page.get_by_test_id("vehicle-text").first).to_be_visible()
 
-    page.get_by_test_id("next-pause").click()
-    expect(page.get_by_test_id("next-resume")).to_be_visible()
     page.get_by_test_id("next-resume").click()
     expect(page.get_by_test_id("next-pause")).to_be_visible()
 
@@ -59,9 +60,7 @@ def test_return_is_held_by_key_and_can_be_let_go(station: Station, page: Page, v
     page.get_by_test_id("tab-plan").click()
     home = page.get_by_test_id("return-home")
     home.focus()
-    page.keyboard.down("Enter")
-    page.wait_for_timeout(200)
-    page.keyboard.up("Enter")
+    page.keyboard.press("Enter")
     expect(page.get_by_text("Hold it for one second")).to_be_visible()
     expect(page.get_by_test_id("chip-mode")).to_contain_text("AUTO")
 
@@ -88,9 +87,7 @@ def test_the_motors_are_stopped_behind_a_guard(station: Station, page: Page, veh
     page.get_by_test_id("emergency-open").click()
     button = page.get_by_test_id("emergency-stop")
     button.focus()
-    page.keyboard.down("Enter")
-    page.wait_for_timeout(200)
-    page.keyboard.up("Enter")
+    page.keyboard.press("Enter")
     expect(page.get_by_text("Hold it for one second")).to_be_visible()
     expect(page.get_by_test_id("next-pause")).to_be_visible()
     button.focus()

@@ -32,6 +32,8 @@ def test_help_is_read_beside_the_console(station: Station, page: Page) -> None:
 
     picture = pages.get_by_role("img").first
     expect(picture).to_be_visible()
+    # Its words may stand in its place while it is on its way.
+    expect(picture).to_have_js_property("complete", True)
     assert picture.evaluate("image => image.naturalWidth") > 1000
     pages.get_by_role("navigation", name="Contents").get_by_role("link", name="Files on disk").click()
     expect(pages.get_by_role("heading", level=1)).to_have_text("Files on disk")

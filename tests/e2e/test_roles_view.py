@@ -19,7 +19,7 @@ from telemetry.link.audit import open_audit
 from telemetry.link.keys import audit_key_file
 from telemetry.topics.messages import CommandRecord
 from tests.e2e.stations import SimulatedVehicle, Station
-from tests.e2e.steps import STREAM, certified, connect, enter, hold, open_demo
+from tests.e2e.steps import PATIENCE_MS, STREAM, certified, connect, enter, hold, open_demo
 from tests.server.station import ok
 from tests.telemetry.frames import heartbeat, packed
 
@@ -69,6 +69,8 @@ def test_control_is_taken_by_a_press_asked_for_and_free_once_nobody_is_heard(
 
 
 def test_people_are_invited_come_in_once_and_are_signed_out(station: Station, page: Page, other_page: Page) -> None:
+    for name in ("Olga", "Bea"):
+        station.http.delete(f"/api/accounts/{name}")
     enter(page, station)
     page.get_by_test_id("accounts").click()
     for name, role in (("Olga", "observer"), ("Bea", "operator")):
@@ -81,7 +83,7 @@ def test_people_are_invited_come_in_once_and_are_signed_out(station: Station, pa
 
     other_page.goto(link)
     expect(other_page.get_by_test_id("verdict")).to_be_visible()
-    again = httpx.get(link)
+    again = httpx.get(link, timeout=PATIENCE_MS / 1000)
     assert again.status_code == 401
     assert "has been used" in again.text
 

@@ -7,6 +7,7 @@ import re
 import pytest
 from playwright.sync_api import Frame, Page, WebSocketRoute, expect
 
+from tests.e2e.conftest import VIEW
 from tests.e2e.stations import Station
 from tests.e2e.steps import STREAM, drawn, open_demo, visit, wait_until
 
@@ -25,6 +26,10 @@ IN_FRONT = """() => {
 """What of the frame's page takes clicks before its canvas does."""
 
 
+TWO_PICTURES = """() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))"""
+"""By the second one the page has taken its new size."""
+
+
 def test_nothing_lies_over_the_picture(station: Station, page_3d: Page) -> None:
     open_demo(page_3d, station)
     drawn(page_3d)
@@ -32,7 +37,7 @@ def test_nothing_lies_over_the_picture(station: Station, page_3d: Page) -> None:
     widths_px = []
     for width, height in SIZES:
         page_3d.set_viewport_size({"width": width, "height": height})
-        page_3d.wait_for_timeout(1500)
+        view.evaluate(TWO_PICTURES)
         widths_px.append(view.evaluate("innerWidth"))
         assert view.evaluate(IN_FRONT) == [], f"{width} px: something covers the picture"
         assert not view.locator(".mantine-Paper-root:visible, [data-floating-window]:visible").count()
@@ -51,7 +56,8 @@ def test_a_stream_that_breaks_off_leaves_the_3d_view_as_it_is(station: Station, 
     handle = page.get_by_test_id("view-frame").element_handle()
     view = handle.content_frame() if handle is not None else None
     assert view is not None
-    view.wait_for_load_state()
+    # The page that the frame is opened for: a mark on the empty one before it would go with that.
+    view.wait_for_url(VIEW)
     view.evaluate("() => { window.isTheSame = true }")
     streams[0].close(code=4408)
     wait_until(page, lambda: len(streams) == 2)

@@ -61,11 +61,15 @@ def test_the_velocity_display_shares_its_place_and_keeps_its_size(towards_anothe
 
 
 def _below_the_tabs(page: Page, display: str) -> list[float]:
-    """Where and how large: wherever a click has scrolled the panel to."""
-    tabs, box = (page.get_by_test_id(testid).bounding_box() for testid in ("displays", display))
-    assert tabs is not None
-    assert box is not None
-    return [box["x"] - tabs["x"], box["y"] - tabs["y"], box["width"], box["height"]]
+    """Where and how large, at one moment: wherever a click has scrolled the panel to."""
+    return page.get_by_test_id(display).evaluate(BELOW_THE_TABS)
+
+
+BELOW_THE_TABS = """display => {
+  const tabs = document.querySelector("[data-testid=displays]").getBoundingClientRect();
+  const box = display.getBoundingClientRect();
+  return [box.x - tabs.x, box.y - tabs.y, box.width, box.height];
+}"""
 
 
 def test_the_safety_radius_is_set_and_kept(towards_another: Station, page: Page) -> None:
@@ -83,8 +87,11 @@ def _set_radius(page: Page, value: str) -> str:
     if not radius.count():
         section.get_by_role("button").first.click()
     before = radius.input_value()
+    assert before != value
     radius.fill(value)
-    radius.press("Enter")
+    # Until it is kept: a page that is left before that takes it along.
+    with page.expect_response(re.compile("/api/obstacles/settings$")):
+        radius.press("Enter")
     expect(section.get_by_test_id("error-box")).to_have_count(0)
     return before
 
