@@ -39,6 +39,7 @@ class Station:
 
     def __init__(self, server: Running, socket: Connection) -> None:
         self.server, self.http, self.socket = server, server.http, socket
+        self._jobs: dict[str, JobDoc] = {}
         self.snapshot: Snapshot = self.until(lambda message: isinstance(message, Snapshot))
         self.page_id = self.snapshot.page_id
 
@@ -46,6 +47,8 @@ class Station:
         end = time.monotonic() + patience_s
         while True:
             message = _MESSAGE.validate_json(self.socket.recv(timeout=max(0.0, end - time.monotonic())))
+            if isinstance(message, JobMessage):
+                self._jobs[message.job.id] = message.job
             if wanted(message):
                 return message
 
@@ -96,10 +99,14 @@ class Station:
         return self.ended(JobDoc.model_validate_json(ok(response).text).id)
 
     def ended(self, job_id: str) -> JobDoc:
-        def over(message: Any) -> bool:
-            return isinstance(message, JobMessage) and message.job.id == job_id and message.job.state != "running"
+        """It may have come before what the job led to: the newest of a kind is sent in the place of the oldest."""
 
-        return self.until(over).job
+        def is_over() -> bool:
+            return job_id in self._jobs and self._jobs[job_id].state != "running"
+
+        if not is_over():
+            self.until(lambda _: is_over())
+        return self._jobs[job_id]
 
     def uploads_left(self) -> list[Path]:
         return list((self.server.settings.data_dir / "uploads").iterdir())
