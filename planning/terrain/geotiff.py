@@ -38,6 +38,8 @@ class ReadOptions(TypedDict, total=False):
     """Metres per stored unit: 0.01 for centimetres."""
     vertical_datum: str | None
     limits: RasterLimits | None
+    virtual: bool
+    """Whether it may be a virtual raster (VRT): a list of tiles in its own folder."""
     progress: Progress | None
     """May raise to cancel."""
 
@@ -90,7 +92,7 @@ def read_orthophoto(
 
     def order(fields: dict[str, Any]) -> dict[str, Any]:
         header = RasterHeader.from_json(fields)
-        check_size(header, limits, where=source.name)
+        check_size(header, limits.max_px, limits, where=source.name)
         check_georeference(header, where=source.name)
         reference = georef.interpret(header, crs=declared_crs, vertical_datum=None, where=source.name)
         plans.append(plan_orthophoto(header, reference.horizontal, bounds_m, crs, max_px=max_px, where=source.name))
@@ -132,7 +134,13 @@ def _declared(how: ReadOptions) -> Declared:
     z_scale = how.get("z_scale")
     if z_scale is not None and not (np.isfinite(z_scale) and z_scale > 0):
         raise ParameterError(f"The height scale must be greater than 0, got {z_scale}.", where="z_scale")
-    return Declared(how.get("crs"), z_scale, how.get("vertical_datum"), how.get("limits") or RasterLimits())
+    return Declared(
+        how.get("crs"),
+        z_scale,
+        how.get("vertical_datum"),
+        how.get("limits") or RasterLimits(),
+        how.get("virtual", False),
+    )
 
 
 def _read(path: str | os.PathLike[str], how: ReadOptions) -> tuple[Dsm, ReadReport]:

@@ -18,6 +18,7 @@ from planning.errors import NoElevationError, ParameterError, RasterError
 from planning.terrain.dsm import Dsm
 from planning.terrain.geotiff import DsmFile, open_dsm, read_dsm
 from planning.terrain.rasters import decode, dsm_file
+from planning.terrain.rasters.dataset import FileGrid
 from planning.terrain.rasters.header import RasterLimits
 from planning.terrain.rasters.heights import mask_and_scale
 from planning.terrain.rasters.part_of import needed_pixels, part_of
@@ -126,7 +127,7 @@ def test_parts_come_from_the_file_as_from_the_whole_model(files: dict[str, Path]
 
 def test_only_the_blocks_of_the_part_are_decoded(files: dict[str, Path]) -> None:
     with rasterio.open(files["metres"]) as source:
-        windows = decode._windows(source, 20, 40, 30, 60)
+        windows = decode._windows(FileGrid(source, files["metres"]), 20, 40, 30, 60)
     covered = np.zeros((ROWS, COLUMNS), dtype=int)
     for window in windows:
         covered[window.row_off : window.row_off + window.height, window.col_off : window.col_off + window.width] += 1

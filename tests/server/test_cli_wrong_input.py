@@ -163,7 +163,8 @@ def test_model_that_is_none(demo: Inputs, earlier: Path, tmp_path: Path) -> None
     junk.write_bytes(bytes(range(256)) * 20)
     cut.write_bytes(demo.model.read_bytes()[: demo.model.stat().st_size // 2])
     (tmp_path / "vrt.tif").write_text("<VRTDataset rasterXSize='2' rasterYSize='2'></VRTDataset>")
-    assert "directory" in refused(earlier, demo.folder, demo.points)["what"]
+    (tmp_path / "empty").mkdir()
+    assert "no GeoTIFF" in refused(earlier, tmp_path / "empty", demo.points)["what"]
     assert "no such file" in refused(earlier, demo.folder / "missing.tif", demo.points)["what"]
     assert "unknown kind" in refused(earlier, junk, demo.points)["what"]
     assert "VRT" in refused(earlier, tmp_path / "vrt.tif", demo.points)["what"]

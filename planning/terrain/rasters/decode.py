@@ -2,34 +2,31 @@
 
 from __future__ import annotations
 
-import hashlib
 import warnings
 from collections.abc import Callable
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 import rasterio
 from affine import Affine
-from rasterio.enums import Interleaving, Resampling
+from rasterio.enums import Resampling
 from rasterio.errors import NotGeoreferencedWarning
 from rasterio.windows import Window
 
 from mapping.geometry.arrays import F32
-from planning.terrain.rasters.header import RasterHeader
+from planning.terrain.rasters.dataset import DATUM_TAG, Grid, header_of, opened_grid
 from planning.terrain.rasters.heights import HeightStats
 
 Json = dict[str, Any]
 Send = Callable[..., None]
 Ask = Callable[[Json], Json]
 
-DATUM_TAG = "HEDGEHOP_VERTICAL_DATUM"
 _PART_PX = 4_000_000
-_SAMPLE_BLOCKS = 49
+_SAMPLE_BLOCKS, _SAMPLE_TRIES = 49, 20_000
 _GOLDEN = 0.6180339887498949
 """Its multiples, their whole parts cut off, lie evenly between 0 and 1."""
-_DIGEST_BYTES = 2**22
 # A file's own georeference is judged by the parent, in its own words.
 warnings.simplefilter("ignore", NotGeoreferencedWarning)
 
@@ -40,17 +37,17 @@ def read_grid(job: Json, send: Send, ask: Ask) -> None:
     What is asked for: "pixels", [first row, first column, rows, columns], or null for none; the file's "digest"; the
     statistics of a "sample" of it.
     """
-    with rasterio.open(job["source"], driver=job["driver"]) as source:
-        order = ask(header_of(source).as_json())
-        digest = _digest(Path(job["source"])) if order["digest"] else ""
+    with opened_grid(job) as grid:
+        order = ask(grid.header.as_json())
+        digest = grid.digest() if order["digest"] else ""
         sample, stats = HeightStats(), HeightStats()
-        for window in _sample(source) if order["sample"] else ():
-            sample.add(_known_heights(source, window))
+        for window in _sample(grid) if order["sample"] else ():
+            sample.add(grid.heights(window))
         if order["pixels"] is not None:
             row0, column0, rows, columns = order["pixels"]
             with Path(job["target"]).open("wb") as target:
-                for window in _windows(source, row0, column0, rows, columns):
-                    heights = stats.add(_known_heights(source, window))
+                for window in _windows(grid, row0, column0, rows, columns):
+                    heights = stats.add(grid.heights(window))
                     _place(target, heights, window.row_off - row0, window.col_off - column0, columns)
                     send("progress", stage="decode", share=(window.row_off - row0 + window.height) / rows)
     send("done", sha256=digest, stats=stats.as_json(), sample=sample.as_json())
@@ -108,32 +105,11 @@ JOBS: dict[str, Callable[[Json, Send, Ask], None]] = {
 }
 
 
-def header_of(source: Any) -> RasterHeader:
-    """The header of an open dataset."""
-    block_height, block_width = source.block_shapes[0]
-    shared = source.count if source.interleaving == Interleaving.pixel else 1
-    return RasterHeader(
-        driver=source.driver,
-        width_px=source.width,
-        height_px=source.height,
-        dtypes=tuple(source.dtypes),
-        colours=tuple(colour.name for colour in source.colorinterp),
-        transform=tuple(source.transform)[:6],
-        crs_wkt=source.crs.to_wkt() if source.crs else None,
-        has_gcps=bool(source.gcps[0]),
-        block_bytes=block_height * block_width * shared * np.dtype(source.dtypes[0]).itemsize,
-        unit=source.units[0],
-        scale=source.scales[0],
-        offset=source.offsets[0],
-        vertical_datum=source.tags().get(DATUM_TAG),
-    )
-
-
-def _windows(source: Any, row0: int, column0: int, rows: int, columns: int) -> list[Window]:
+def _windows(grid: Grid, row0: int, column0: int, rows: int, columns: int) -> list[Window]:
     """Parts of about ``_PART_PX`` that cut no block inside: whole rows, or less of them where blocks are tall."""
-    block_height, block_width = source.block_shapes[0]
+    block_height, block_width = grid.block
     high = max(1, _PART_PX // (columns * block_height)) * block_height
-    wide = source.width
+    wide = grid.header.width_px
     if high * columns > _PART_PX:
         wide = max(1, _PART_PX // (high * block_width)) * block_width
     tops, lefts = _cuts(row0, rows, high, block_height), _cuts(column0, columns, wide, block_width)
@@ -150,17 +126,21 @@ def _cuts(first: int, count: int, step: int, block: int) -> list[int]:
     return [first, *inner, first + count]
 
 
-def _sample(source: Any) -> list[Window]:
-    """Blocks spread evenly over the raster."""
-    height, width = source.block_shapes[0]
-    down, across = -(-source.height // height), -(-source.width // width)
+def _sample(grid: Grid) -> list[Window]:
+    """Blocks spread evenly over what was written of the raster."""
+    (height, width), header = grid.block, grid.header
+    down, across = -(-header.height_px // height), -(-header.width_px // width)
     count = min(_SAMPLE_BLOCKS, max(1, _PART_PX // (height * width)))
-    numbers = sorted({int(k * _GOLDEN % 1.0 * down * across) for k in range(count)})
-    corners = [(number // across * height, number % across * width) for number in numbers]
-    return [
-        Window(left, top, min(width, source.width - left), min(height, source.height - top))  # pyright: ignore[reportCallIssue]
-        for top, left in corners
-    ]
+    numbers = dict.fromkeys(int(k * _GOLDEN % 1.0 * down * across) for k in range(_SAMPLE_TRIES))
+    blocks = [_block(grid, number // across, number % across) for number in numbers]
+    written = list(islice(filter(grid.holds, blocks), count))
+    return sorted(written or blocks[:count], key=lambda window: (window.row_off, window.col_off))
+
+
+def _block(grid: Grid, down: int, across: int) -> Window:
+    (height, width), header = grid.block, grid.header
+    top, left = down * height, across * width
+    return Window(left, top, min(width, header.width_px - left), min(height, header.height_px - top))  # pyright: ignore[reportCallIssue]
 
 
 def _place(target: BinaryIO, part: F32, row: int, column: int, width: int) -> None:
@@ -169,21 +149,3 @@ def _place(target: BinaryIO, part: F32, row: int, column: int, width: int) -> No
     for line, heights in enumerate(lines):
         target.seek(4 * ((row + line) * width + column))
         target.write(np.ascontiguousarray(heights).data)
-
-
-def _known_heights(source: Any, window: Window) -> F32:
-    block = source.read(1, window=window, masked=True)
-    with np.errstate(over="ignore", invalid="ignore"):
-        heights = block.data.astype(np.float32)
-        heights[np.ma.getmaskarray(block)] = np.nan
-    if source.count == 2:  # GDAL masks by an alpha band only where it is of whole numbers
-        heights[source.read(2, window=window) == 0] = np.nan
-    return heights
-
-
-def _digest(path: Path) -> str:
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while part := file.read(_DIGEST_BYTES):
-            digest.update(part)
-    return digest.hexdigest()

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from planning.errors import ParameterError, RasterError
+from planning.errors import ParameterError, RasterError, RasterFormatError
 from planning.terrain.dsm import LARGE_PX, Dsm, SurfaceModel
 from planning.terrain.rasters.assemble import ReadReport, assemble
 from planning.terrain.rasters.header import RasterHeader
 from planning.terrain.rasters.heights import doubts, mask_and_scale
 from planning.terrain.rasters.part_of import model_grid, needed_pixels, part_of
-from planning.terrain.rasters.reading import Declared, Pixels, Progress, Read, all_of, file_identity, read_surface
+from planning.terrain.rasters.reading import Declared, Pixels, Progress, Read, all_of, files_identity, read_surface
 
 AHEAD_PX = 256
 """Decoded around what is asked for: the next question is mostly about a little more."""
@@ -28,7 +28,7 @@ class DsmFile(SurfaceModel):
 
     def __init__(self, source: Path, declared: Declared, progress: Progress | None = None) -> None:
         self._source, self._declared, self._progress = source, declared, progress
-        self._identity = file_identity(source)
+        self._identity = files_identity(source, virtual=declared.virtual)
         self.name = source.name
         self._kept: tuple[Pixels, np.ndarray] | None = None
         self._whole: Dsm | None = None
@@ -40,7 +40,7 @@ class DsmFile(SurfaceModel):
         """Of the whole; None while only parts were read."""
         if self._first.stored is not None:
             self._assemble(self._first)
-        elif self._first.sample.known == 0:
+        elif self._first.sample.known == 0 and self._can_be_whole:
             self.whole()
 
     @property
@@ -57,6 +57,8 @@ class DsmFile(SurfaceModel):
         if self.report is not None:
             return self.report.warnings
         plan, sample = self._first.plan, self._first.sample
+        if sample.known == 0:
+            return (*plan.notes, "Nothing but unknown cells was found in a sample of it.")
         return (*plan.notes, *doubts(sample, dtype=plan.header.dtypes[0], scaled=plan.scaled))
 
     def whole(self) -> Dsm:
@@ -97,17 +99,33 @@ class DsmFile(SurfaceModel):
         wanted = Pixels(row0, column0, rows, columns)
         read = self._look(wanted)
         if read.stats.sentinels:
+            self._check_sentinels(read)
             self.whole()
             return
         assert read.stored is not None
         mask_and_scale(read.stored, sentinels=(), scale=plan.height_scale, offset=plan.height_offset)
         self._kept = wanted, read.stored
 
+    @property
+    def _can_be_whole(self) -> bool:
+        return self.height_px * self.width_px <= self._declared.limits.max_px
+
+    def _check_sentinels(self, read: Read) -> None:
+        """Whether such a number is a height only the whole model tells."""
+        if not self._can_be_whole:
+            value = next(iter(read.stats.sentinels))
+            raise RasterFormatError(
+                f"{read.stats.sentinels[value]} cells of it are {value}, which may be a height or mean unknown; "
+                f"the model is too large to be looked through.",
+                where=self._source.name,
+                advice=f"Declare what it means: gdal_edit.py -a_nodata {value} FILE",
+            )
+
     def _look(self, wanted: Pixels) -> Read:
         read = read_surface(
             self._source, self._declared, lambda header: wanted, first_look=False, progress=self._progress
         )
-        if file_identity(self._source) != self._identity:
+        if files_identity(self._source, virtual=self._declared.virtual) != self._identity:
             raise RasterError(
                 "The file was changed while it was being read.", where=self._source.name, advice="Start again."
             )

@@ -15,7 +15,9 @@ class RasterLimits:
     """Bounds on a raster file. The header ones are checked before any pixel is decoded."""
 
     max_px: int = 400_000_000
-    """Pixels of the file, and of the grid it is resampled to."""
+    """Pixels that are read at once, and squares of the grid that they are brought to."""
+    max_file_px: int = 100_000_000_000
+    """Pixels of a file, and squares of its grid, of which only parts are read."""
     max_block_bytes: int = 64 * 2**20
     """One decoded tile or strip: a decoder must hold it whole, however small the part asked for."""
     max_memory_bytes: int = 1536 * 2**20
@@ -76,21 +78,25 @@ class RasterHeader:
         return eight_bit_colours or {"red", "green", "blue"} <= set(self.colours)
 
 
-def check_size(header: RasterHeader, limits: RasterLimits, *, where: str) -> None:
-    """RasterTooLargeError when the file is larger than the limits allow."""
-    pixels = header.width_px * header.height_px
-    if pixels > limits.max_px:
-        raise RasterTooLargeError(
-            f"{header.width_px} x {header.height_px} pixels are more than the limit of {limits.max_px:,}.",
-            where=where,
-            advice="Crop it to the area of the flight, or export it at a coarser resolution.",
-        )
+def check_size(header: RasterHeader, max_px: int, limits: RasterLimits, *, where: str) -> None:
+    """RasterTooLargeError when the file has more pixels, or larger blocks, than are allowed."""
+    check_pixels(header.height_px, header.width_px, max_px, where=where)
     if header.block_bytes > limits.max_block_bytes:
         raise RasterTooLargeError(
             f"One block of it decodes to {header.block_bytes / 2**20:.0f} MiB, "
             f"more than the limit of {limits.max_block_bytes / 2**20:.0f} MiB.",
             where=where,
             advice="Rewrite it in tiles: gdal_translate -co TILED=YES in.tif out.tif",
+        )
+
+
+def check_pixels(rows: int, columns: int, max_px: int, *, where: str) -> None:
+    """RasterTooLargeError when there are more of them than are allowed."""
+    if rows * columns > max_px:
+        raise RasterTooLargeError(
+            f"{columns} x {rows} pixels are more than the limit of {max_px:,}.",
+            where=where,
+            advice="Crop it to the area of the flight, or export it at a coarser resolution.",
         )
 
 

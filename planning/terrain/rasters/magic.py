@@ -41,6 +41,16 @@ def driver_of(path: Path) -> str:
     )
 
 
+def is_virtual(path: Path) -> bool:
+    """Whether a file is a virtual raster (VRT) of GDAL."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(512).lstrip()
+    except OSError:
+        return False  # whoever reads it says why it cannot be read
+    return head.startswith(b"<VRTDataset") or (head.startswith(b"<?xml") and b"<VRTDataset" in head)
+
+
 def _kind(head: bytes) -> str:
     if not head:
         return "an empty file"

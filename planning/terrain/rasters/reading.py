@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from mapping.geometry.arrays import F32
-from planning.errors import RasterError, RasterFormatError
+from planning.errors import RasterError, RasterFormatError, RasterTooLargeError
 from planning.terrain.rasters import sandbox
-from planning.terrain.rasters.header import RasterHeader, RasterLimits
+from planning.terrain.rasters.header import RasterHeader, RasterLimits, check_pixels
 from planning.terrain.rasters.heights import HeightStats
 from planning.terrain.rasters.magic import driver_of
 from planning.terrain.rasters.memory_at_hand import (
@@ -24,6 +24,7 @@ from planning.terrain.rasters.memory_at_hand import (
     watched,
 )
 from planning.terrain.rasters.surface_plan import SurfacePlan, plan_surface
+from planning.terrain.rasters.tiles import tiles_of
 
 Progress = Callable[[str, float], None]
 """Called with a stage ("decode", "resample", "spikes") and the share of it that is done."""
@@ -56,6 +57,8 @@ class Declared:
     z_scale: float | None
     vertical_datum: str | None
     limits: RasterLimits
+    virtual: bool = False
+    """Whether it may be a virtual raster, whose tiles are read then: not where somebody else sent it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,12 +106,12 @@ def read_surface(
         asked.append(wanted(header))
         box = asked[0]
         if box is not None:
-            check_memory(_need_bytes(plans[0], box), shape=(box.rows, box.columns), where=source.name)
+            _check_read(plans[0], box, declared.limits, where=source.name)
         pixels = None if box is None else [box.row0, box.column0, box.rows, box.columns]
         return {"pixels": pixels, "digest": first_look, "sample": first_look and pixels is None}
 
     with sandbox.private_directory() as directory:
-        job = raster_job("read_grid", source, directory)
+        job = raster_job("read_grid", source, directory, virtual=declared.virtual)
         answer = sandbox.run_job(
             job,
             directory=directory,
@@ -130,25 +133,53 @@ def all_of(header: RasterHeader) -> Pixels:
     return Pixels(0, 0, header.height_px, header.width_px)
 
 
-def _need_bytes(plan: SurfacePlan, box: Pixels) -> int:
+def _check_read(plan: SurfacePlan, box: Pixels, limits: RasterLimits, *, where: str) -> None:
+    """RasterTooLargeError when these pixels, or the squares that they become, are too many to be read at once."""
+    check_pixels(box.rows, box.columns, limits.max_px, where=where)
     cells = box.rows * box.columns
-    if plan.placing is None:
-        return BYTES_PER_PX * cells
+    squares = _squares_of(plan, cells)
+    if squares > limits.max_px:
+        raise RasterTooLargeError(
+            f"Brought to north-up squares it has {squares:,} cells, more than {limits.max_px:,}.",
+            where=where,
+            advice="Crop it to the area of the flight, or export it north up with square pixels.",
+        )
+    need_bytes = BYTES_PER_PX * cells if plan.placing is None else BYTES_PER_SQUARE * (cells + squares)
+    check_memory(need_bytes, shape=(box.rows, box.columns), where=where)
+
+
+def _squares_of(plan: SurfacePlan, cells: int) -> int:
+    """About how many squares of the grid so many of the file's cells become."""
     whole = plan.header.height_px * plan.header.width_px
     rows, columns = plan.grid[1] if plan.grid else (plan.header.height_px, plan.header.width_px)
-    return BYTES_PER_SQUARE * (cells + rows * columns * cells // whole)
+    return rows * columns * cells // whole
 
 
-def raster_job(name: str, source: Path, directory: Path) -> dict[str, Any]:
-    """What the child process is told: the file by a name of our own, and where its answer goes."""
+def raster_job(name: str, source: Path, directory: Path, *, virtual: bool = False) -> dict[str, Any]:
+    """What the child process is told: the file, or the tiles, by names of our own, and where its answer goes."""
+    job = {"job": name, "target": str(directory / token_hex(8))}
+    tiles = tiles_of(source, virtual=virtual)
+    if tiles is None:
+        return {**job, **_linked(source, directory)}
+    return {**job, "tiles": [{"name": tile.name, **_linked(tile, directory)} for tile in tiles]}
+
+
+def _linked(source: Path, directory: Path) -> dict[str, str]:
     driver = driver_of(source)
     link = directory / token_hex(8)
     link.symlink_to(source.resolve())
-    return {"job": name, "driver": driver, "source": str(link), "target": str(directory / token_hex(8))}
+    return {"driver": driver, "source": str(link)}
 
 
-def file_identity(source: Path) -> tuple[int, int, int]:
-    """Changes when the file is written or replaced."""
+def files_identity(source: Path, *, virtual: bool) -> tuple[int | str, ...]:
+    """Changes when the file, or any tile, is written, replaced, added or removed."""
+    tiles = tiles_of(source, virtual=virtual)
+    if tiles is None:
+        return _file_identity(source)
+    return tuple(mark for tile in tiles for mark in (str(tile), *_file_identity(tile)))
+
+
+def _file_identity(source: Path) -> tuple[int, int, int]:
     try:
         found = os.stat(source)
     except FileNotFoundError as error:

@@ -59,7 +59,7 @@ def plan_surface(
     where: str,
 ) -> SurfacePlan:
     """Judge a header and plan what to do with the file; raises the RasterError that refuses it."""
-    check_size(header, limits, where=where)
+    check_size(header, limits.max_file_px, limits, where=where)
     check_surface_bands(header, where=where)
     check_georeference(header, where=where)
     reference = georef.interpret(header, crs=crs, vertical_datum=vertical_datum, where=where)
@@ -100,9 +100,9 @@ def _placed(
         return placing, None
     grid = square_grid(placing.layout, extent_of(forward, shape))
     pixels = grid[1][0] * grid[1][1]
-    if pixels > limits.max_px:
+    if pixels > limits.max_file_px:
         raise RasterTooLargeError(
-            f"Brought to north-up squares it has {pixels:,} cells, more than {limits.max_px:,}.",
+            f"Brought to north-up squares it has {pixels:,} cells, more than {limits.max_file_px:,}.",
             where=where,
             advice="Crop it to the area of the flight, or export it north up with square pixels.",
         )

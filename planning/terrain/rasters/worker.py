@@ -18,6 +18,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TextIO
 
+from planning.errors import RasterFormatError
 from planning.terrain.rasters.confinement import confine, confine_files
 
 Json = dict[str, Any]
@@ -89,10 +90,13 @@ def _readable(job: Json) -> list[Path]:
     installed = [path for path in sys.path if Path(path) != floors[0].parent]
     data = [os.environ[name] for name in ("PROJ_DATA", "PROJ_LIB") if name in os.environ]
     theirs = [sys.prefix, sys.base_prefix, *installed, *data, "/usr", "/lib", "/lib64", "/etc", "/dev/null"]
-    return [Path(job["source"]).resolve(), *floors, *map(Path, theirs)]
+    files = [file["source"] for file in job.get("tiles", [job])]
+    return [*(Path(file).resolve() for file in files), *floors, *map(Path, theirs)]
 
 
 def _explain(error: Exception, job: str) -> Json:
+    if isinstance(error, RasterFormatError):
+        return {"kind": "format", "what": error.what, "advice": error.advice}
     cause, kind = str(error.__cause__ or error) or type(error).__name__, _KINDS.get(job, "raster")
     if isinstance(error, MemoryError) or "memory" in cause.lower() or "allocat" in cause.lower():
         return {

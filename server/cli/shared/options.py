@@ -19,9 +19,12 @@ _SURFACE, _PATH, _MISSION, _VEHICLE = SurfaceParams(), PathParams(), MissionPara
 _SHIPPED = f"A shipped profile ({', '.join(shipped_profiles())}) or a TOML file"
 _FLOWN_AS = "Mission on board, or waypoints handed over one at a time"
 
-DsmFile = Annotated[Path, Argument(metavar="DSM", help="Surface model: GeoTIFF or ESRI ASCII grid.")]
+DsmFile = Annotated[
+    Path, Argument(metavar="DSM", help="Surface model: GeoTIFF, ESRI ASCII grid, folder of tiles or VRT.")
+]
 FlightDsm = Annotated[
-    Path | None, Option(metavar="FILE", help="Surface model that is flown over: GeoTIFF or ESRI ASCII grid.")
+    Path | None,
+    Option(metavar="FILE", help="Surface model that is flown over: GeoTIFF, ESRI ASCII grid, folder of tiles or VRT."),
 ]
 MissionFile = Annotated[Path, Argument(metavar="MISSION", help="Mission: .waypoints or .plan.")]
 Link = Annotated[

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from mapping.geometry.arrays import F64
-from planning.errors import RasterFormatError
 from planning.planner.part import FLIGHT_MARGIN_M, needed_part
 from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.geotiff import open_dsm, read_dsm_reported
@@ -38,7 +37,6 @@ def open_model(path: Path, timer: StepTimer, options: ModelOptions) -> OpenedMod
     if options.remove_spikes:
         dsm, made = read_model(path, timer, options)
         return OpenedModel(dsm, made, spikes_told=True)
-    _check_file(path)
     timer(READ_STEP, 0.0)
     model = open_dsm(path, **_how(options, timer))
     end_progress()
@@ -59,7 +57,6 @@ def read_around(path: Path, timer: StepTimer, options: ModelOptions, places: Cal
 
 def read_model(path: Path, timer: StepTimer, options: ModelOptions) -> tuple[Dsm, dict[str, object]]:
     """All of a surface model, and what was done to its heights, for the certificate's assumptions."""
-    _check_file(path)
     timer(READ_STEP, 0.0)
     dsm, report = read_dsm_reported(path, remove_spikes=options.remove_spikes, **_how(options, timer))
     end_progress()
@@ -73,13 +70,9 @@ def _how(options: ModelOptions, timer: StepTimer) -> dict[str, Any]:
         "crs": options.crs,
         "z_scale": options.z_scale,
         "vertical_datum": options.vertical_datum,
+        "virtual": True,
         "progress": lambda stage, share: timer(READ_STEP, share),
     }
-
-
-def _check_file(path: Path) -> None:
-    if path.is_dir():
-        raise RasterFormatError("This is a directory.", where=str(path), advice="Give the file of the model itself.")
 
 
 def _say_spikes(spikes: Sequence[Spike], *, removed: bool) -> None:
