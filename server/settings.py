@@ -113,6 +113,9 @@ class Settings(BaseSettings):
     """Further origins, such as https://gcs.example when a proxy adds TLS, separated by commas."""
     upload_limit_bytes: Annotated[int, Field(gt=0)] = 2 * GIB
     """Largest surface model, orthophoto, recording or radar file that can be dropped in."""
+    dsm_urls: Names = ()
+    """Addresses below which the command line may read surface models by HTTP ranges, separated by commas:
+    https://maps.example/dsm/. Nothing else is asked for, redirects are not followed."""
     link: Names = ()
     """Connections to vehicles, separated by commas: udpin:0.0.0.0:14550, tcp:10.0.0.7:5760, /dev/ttyACM0:57600. The
     first vehicle heard on one of them is the one that is flown; the others are further ways to it."""

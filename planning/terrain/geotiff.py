@@ -24,6 +24,7 @@ from planning.terrain.rasters.assemble import ReadReport, assemble
 from planning.terrain.rasters.dsm_file import DsmFile
 from planning.terrain.rasters.header import RasterHeader, RasterLimits, check_georeference, check_size
 from planning.terrain.rasters.memory_at_hand import watched
+from planning.terrain.rasters.ranges import RemoteFile
 from planning.terrain.rasters.reading import Declared, Progress, all_of, raster_job, read_surface
 from planning.terrain.spikes import find_spikes
 from planning.terrain.spikes import remove_spikes as without_spikes
@@ -68,9 +69,9 @@ def read_dsm_reported(
     return dsm, replace(report, spikes=spikes, spikes_removed=remove_spikes and bool(spikes))
 
 
-def open_dsm(path: str | os.PathLike[str], **how: Unpack[ReadOptions]) -> DsmFile:
+def open_dsm(path: str | os.PathLike[str] | RemoteFile, **how: Unpack[ReadOptions]) -> DsmFile:
     """The surface model of ``read_dsm``, of a large file only the parts that are asked for; isolated spikes stay."""
-    return DsmFile(Path(path), _declared(how), how.get("progress"))
+    return DsmFile(path if isinstance(path, RemoteFile) else Path(path), _declared(how), how.get("progress"))
 
 
 def read_orthophoto(

@@ -15,6 +15,7 @@ from rasterio.enums import Interleaving
 from rasterio.windows import Window
 
 from mapping.geometry.arrays import F32
+from planning.terrain.rasters.byte_pipe import Asking, PipeFile
 from planning.terrain.rasters.header import RasterHeader
 from planning.terrain.rasters.mosaic import Mosaic, mosaic_of
 
@@ -48,8 +49,14 @@ class Grid(Protocol):
 
 @contextmanager
 def opened_grid(job: Json) -> Iterator[Grid]:
-    """The raster of a job: its "source", or its "tiles"."""
-    if "tiles" in job:
+    """The raster of a job: its "source", its "tiles", or what is asked for through its "pipe"."""
+    if "pipe" in job:
+        asking = Asking(*job["pipe"])
+        with rasterio.open(
+            "model.tif", driver=job["driver"], opener=lambda path, mode="rb": PipeFile(asking, job["size_bytes"])
+        ) as source:
+            yield FileGrid(source, None)
+    elif "tiles" in job:
         with ExitStack() as stack:
             yield TileGrid(job["tiles"], stack)
     else:
@@ -58,9 +65,9 @@ def opened_grid(job: Json) -> Iterator[Grid]:
 
 
 class FileGrid:
-    """One file."""
+    """One file; without a path, one that is not here as a whole."""
 
-    def __init__(self, source: Any, path: Path) -> None:
+    def __init__(self, source: Any, path: Path | None) -> None:
         self._source, self._path = source, path
         self.header, self.block = header_of(source), source.block_shapes[0]
 
@@ -75,7 +82,7 @@ class FileGrid:
         return self._source.get_tag_item(f"BLOCK_OFFSET_{across}_{down}", "TIFF", bidx=1) is not None
 
     def digest(self) -> str:
-        return digest_of(self._path)
+        return "" if self._path is None else digest_of(self._path)
 
 
 class TileGrid:

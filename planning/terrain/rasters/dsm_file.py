@@ -13,6 +13,7 @@ from planning.terrain.rasters.assemble import ReadReport, assemble
 from planning.terrain.rasters.header import RasterHeader
 from planning.terrain.rasters.heights import doubts, mask_and_scale
 from planning.terrain.rasters.part_of import model_grid, needed_pixels, part_of
+from planning.terrain.rasters.ranges import RemoteFile
 from planning.terrain.rasters.reading import Declared, Pixels, Progress, Read, all_of, files_identity, read_surface
 
 AHEAD_PX = 256
@@ -26,7 +27,7 @@ class DsmFile(SurfaceModel):
     be averages, which lie below an obstacle.
     """
 
-    def __init__(self, source: Path, declared: Declared, progress: Progress | None = None) -> None:
+    def __init__(self, source: Path | RemoteFile, declared: Declared, progress: Progress | None = None) -> None:
         self._source, self._declared, self._progress = source, declared, progress
         self._identity = files_identity(source, virtual=declared.virtual)
         self.name = source.name
@@ -55,11 +56,12 @@ class DsmFile(SurfaceModel):
     def warnings(self) -> tuple[str, ...]:
         """What was assumed or looks wrong, in plain words; of a large file judged by a sample of it."""
         if self.report is not None:
-            return self.report.warnings
+            return (*self.report.warnings, *_of_remote(self._source))
         plan, sample = self._first.plan, self._first.sample
+        notes = (*plan.notes, *_of_remote(self._source))
         if sample.known == 0:
-            return (*plan.notes, "Nothing but unknown cells was found in a sample of it.")
-        return (*plan.notes, *doubts(sample, dtype=plan.header.dtypes[0], scaled=plan.scaled))
+            return (*notes, "Nothing but unknown cells was found in a sample of it.")
+        return (*notes, *doubts(sample, dtype=plan.header.dtypes[0], scaled=plan.scaled))
 
     def whole(self) -> Dsm:
         if self._whole is None:
@@ -141,3 +143,9 @@ class DsmFile(SurfaceModel):
 
 def _all_if_small(header: RasterHeader) -> Pixels | None:
     return all_of(header) if header.height_px * header.width_px < LARGE_PX else None
+
+
+def _of_remote(source: Path | RemoteFile) -> tuple[str, ...]:
+    if isinstance(source, Path):
+        return ()
+    return ("The model's SHA-256 is that of its address, size and version: it was not read as a whole.",)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from secrets import token_hex
@@ -14,6 +15,7 @@ import numpy as np
 from mapping.geometry.arrays import F32
 from planning.errors import RasterError, RasterFormatError, RasterTooLargeError
 from planning.terrain.rasters import sandbox
+from planning.terrain.rasters.byte_pipe import served
 from planning.terrain.rasters.header import RasterHeader, RasterLimits, check_pixels
 from planning.terrain.rasters.heights import HeightStats
 from planning.terrain.rasters.magic import driver_of
@@ -23,6 +25,7 @@ from planning.terrain.rasters.memory_at_hand import (
     check_memory,
     watched,
 )
+from planning.terrain.rasters.ranges import RemoteFile, check_is_tiff
 from planning.terrain.rasters.surface_plan import SurfacePlan, plan_surface
 from planning.terrain.rasters.tiles import tiles_of
 
@@ -77,7 +80,7 @@ class Read:
 
 
 def read_surface(
-    source: Path,
+    source: Path | RemoteFile,
     declared: Declared,
     wanted: Callable[[RasterHeader], Pixels | None],
     *,
@@ -110,8 +113,10 @@ def read_surface(
         pixels = None if box is None else [box.row0, box.column0, box.rows, box.columns]
         return {"pixels": pixels, "digest": first_look, "sample": first_look and pixels is None}
 
-    with sandbox.private_directory() as directory:
-        job = raster_job("read_grid", source, directory, virtual=declared.virtual)
+    with (
+        sandbox.private_directory() as directory,
+        _grid_job(source, directory, virtual=declared.virtual) as (job, pipe),
+    ):
         answer = sandbox.run_job(
             job,
             directory=directory,
@@ -119,13 +124,15 @@ def read_surface(
             where=source.name,
             on_header=order,
             progress=watched(progress, where=source.name),
+            pipe=pipe,
         )
         stored, box = None, asked[0]
         if box is not None:
             # The file's name is gone with the directory; its pages live on while they are mapped.
             stored = np.asarray(np.memmap(job["target"], dtype=np.float32, mode="r+", shape=(box.rows, box.columns)))
     stats, sample = (HeightStats.from_json(answer[name]) for name in ("stats", "sample"))
-    return Read(plans[0], answer["sha256"], stored, stats, sample)
+    sha256 = source.sha256 if isinstance(source, RemoteFile) else answer["sha256"]
+    return Read(plans[0], sha256, stored, stats, sample)
 
 
 def all_of(header: RasterHeader) -> Pixels:
@@ -155,6 +162,24 @@ def _squares_of(plan: SurfacePlan, cells: int) -> int:
     return rows * columns * cells // whole
 
 
+@contextmanager
+def _grid_job(
+    source: Path | RemoteFile, directory: Path, *, virtual: bool
+) -> Iterator[tuple[dict[str, Any], Sequence[int]]]:
+    """The job, and the child's ends of the pipe through which it reads a file that is not here."""
+    if isinstance(source, Path):
+        yield raster_job("read_grid", source, directory, virtual=virtual), ()
+        return
+    check_is_tiff(source)
+    with served(source.read) as end:
+        job = {"job": "read_grid", "driver": "GTiff", "pipe": end.child, "size_bytes": source.size_bytes}
+        try:
+            yield {**job, "target": str(directory / token_hex(8))}, end.child
+        except RasterError as error:
+            # What the child says of bytes that it did not get is no news.
+            raise end.error or error from error
+
+
 def raster_job(name: str, source: Path, directory: Path, *, virtual: bool = False) -> dict[str, Any]:
     """What the child process is told: the file, or the tiles, by names of our own, and where its answer goes."""
     job = {"job": name, "target": str(directory / token_hex(8))}
@@ -171,8 +196,10 @@ def _linked(source: Path, directory: Path) -> dict[str, str]:
     return {"driver": driver, "source": str(link)}
 
 
-def files_identity(source: Path, *, virtual: bool) -> tuple[int | str, ...]:
-    """Changes when the file, or any tile, is written, replaced, added or removed."""
+def files_identity(source: Path | RemoteFile, *, virtual: bool) -> tuple[int | str, ...]:
+    """Changes when the file, or any tile, is written, replaced, added or removed; a server's file notices it itself."""
+    if isinstance(source, RemoteFile):
+        return (source.sha256,)
     tiles = tiles_of(source, virtual=virtual)
     if tiles is None:
         return _file_identity(source)

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
@@ -68,14 +68,16 @@ def run_job(
     on_header: Callable[[Json], Json] | None = None,
     progress: Progress | None = None,
     smaller: str = _SMALLER,
+    pipe: Sequence[int] = (),
 ) -> Json:
     """Send one job to a new worker and return its answer; the worker never outlives the call.
 
     ``on_header`` judges the header and returns the rest of the order; it may raise, as may ``progress``:
-    both end the worker. Raises RasterError when the worker fails, dies or is late; ``smaller`` says what to do then.
+    both end the worker. It keeps the handles of a ``pipe``. Raises RasterError when the worker fails, dies or is
+    late; ``smaller`` says what to do then.
     """
     with (directory / "stderr").open("w+b") as stderr:
-        worker = _start(directory, stderr)
+        worker = _start(directory, stderr, *pipe)
         clock = _Deadline(worker, limits.header_s)
         try:
             bounds = {"memory_bytes": limits.max_memory_bytes, "cpu_s": int(limits.decode_s) + 1}
@@ -103,7 +105,7 @@ def run_job(
             _end(worker)
 
 
-def _start(directory: Path, stderr: IO[bytes]) -> subprocess.Popen[bytes]:
+def _start(directory: Path, stderr: IO[bytes], *pipe: int) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
         _COMMAND,
         stdin=subprocess.PIPE,
@@ -111,6 +113,7 @@ def _start(directory: Path, stderr: IO[bytes]) -> subprocess.Popen[bytes]:
         stderr=stderr,
         cwd=directory,
         env=_environment(),
+        pass_fds=pipe,
         start_new_session=True,
     )
 

@@ -90,7 +90,7 @@ def _readable(job: Json) -> list[Path]:
     installed = [path for path in sys.path if Path(path) != floors[0].parent]
     data = [os.environ[name] for name in ("PROJ_DATA", "PROJ_LIB") if name in os.environ]
     theirs = [sys.prefix, sys.base_prefix, *installed, *data, "/usr", "/lib", "/lib64", "/etc", "/dev/null"]
-    files = [file["source"] for file in job.get("tiles", [job])]
+    files = [file["source"] for file in job.get("tiles", [job]) if "source" in file]
     return [*(Path(file).resolve() for file in files), *floors, *map(Path, theirs)]
 
 

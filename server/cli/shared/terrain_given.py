@@ -8,12 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from mapping.geometry.arrays import F64
+from planning.errors import ParameterError
 from planning.planner.part import FLIGHT_MARGIN_M, needed_part
 from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.geotiff import open_dsm, read_dsm_reported
+from planning.terrain.rasters.ranges import RemoteFile, is_address
 from planning.terrain.spikes import Spike, find_spikes
 from server.cli.shared.options import ModelOptions
 from server.cli.shared.output import end_progress, say_notes
+from server.settings import load_settings
 from server.work.clocks import READ_STEP, StepTimer
 
 
@@ -38,7 +41,8 @@ def open_model(path: Path, timer: StepTimer, options: ModelOptions) -> OpenedMod
         dsm, made = read_model(path, timer, options)
         return OpenedModel(dsm, made, spikes_told=True)
     timer(READ_STEP, 0.0)
-    model = open_dsm(path, **_how(options, timer))
+    source = RemoteFile(str(path), load_settings().dsm_urls) if is_address(path) else path
+    model = open_dsm(source, **_how(options, timer))
     end_progress()
     say_notes(*model.warnings)
     if model.report is not None:
@@ -57,6 +61,12 @@ def read_around(path: Path, timer: StepTimer, options: ModelOptions, places: Cal
 
 def read_model(path: Path, timer: StepTimer, options: ModelOptions) -> tuple[Dsm, dict[str, object]]:
     """All of a surface model, and what was done to its heights, for the certificate's assumptions."""
+    if is_address(path):
+        raise ParameterError(
+            "This needs the model as a whole, which is not read from a server.",
+            where=path.name,
+            advice="Download the file, or do without it (--remove-spikes, traversability).",
+        )
     timer(READ_STEP, 0.0)
     dsm, report = read_dsm_reported(path, remove_spikes=options.remove_spikes, **_how(options, timer))
     end_progress()
