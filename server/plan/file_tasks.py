@@ -24,6 +24,7 @@ from server.library.orthophotos import store_orthophoto
 from server.library.shelf import read_manifest
 from server.library.terrains import Origin, TerrainManifest, load_terrain, spike_docs, store_terrain
 from server.plan.cloud_task import import_cloud
+from server.plan.tile_archive import is_archive, unpacked_tiles
 from server.schemas import OrthophotoDoc, PlanDoc, TerrainDoc
 from server.work.jobs import Progress
 
@@ -62,8 +63,8 @@ def import_terrain(
     keep_noise: bool,
     report: Progress,
 ) -> TerrainDoc:
-    """Reads an uploaded surface model, or makes one of a point cloud, into the library. Raises RasterError."""
-    with named(upload, filename):
+    """Reads an uploaded surface model, a file, a ZIP of tiles or a point cloud, into the library. Raises RasterError."""
+    with named(upload, filename), _unpacked(upload, filename, report) as source:
         if is_cloud(upload):
             params = CloudParams(cell_m, crs, vertical_datum, z_scale, keep_noise)
             return import_cloud(
@@ -73,7 +74,7 @@ def import_terrain(
             what = "Cell size and noise are asked of point clouds: a raster has its own cells."
             raise ParameterError(what, where=filename, advice="Leave both out.")
         dsm, found = read_dsm_reported(
-            upload,
+            source,
             crs=crs,
             z_scale=z_scale,
             vertical_datum=vertical_datum,
@@ -83,6 +84,17 @@ def import_terrain(
     report("Storing", None)
     spikes = () if found.spikes_removed else found.spikes
     return store_terrain(root, dsm, name=filename, origin=origin, spikes=spike_docs(spikes), warnings=found.warnings)
+
+
+@contextmanager
+def _unpacked(upload: Path, filename: str, report: Progress) -> Iterator[Path]:
+    """What is read of an upload: itself, or a folder of the tiles in it."""
+    if not is_archive(upload):
+        yield upload
+        return
+    report("Unpacking", None)
+    with unpacked_tiles(upload, filename) as folder:
+        yield folder
 
 
 def read_points(

@@ -3,7 +3,7 @@
 const folders = new WeakMap<File, string>();
 const DEEPEST = 4;
 const OPENED =
-  /\.(tiff?|asc|las|laz|ply|pcd|e57|csv|geojson|json|kml|kmz|waypoints|plan|tlog|mcap|ulg|npz|npy|bin|bag|db3)$/i;
+  /\.(tiff?|asc|zip|las|laz|ply|pcd|e57|csv|geojson|json|kml|kmz|waypoints|plan|tlog|mcap|ulg|npz|npy|bin|bag|db3)$/i;
 
 export const folderOf = (file: File): string => folders.get(file) ?? "";
 

@@ -44,7 +44,7 @@ export const NO_HINTS: RasterHints = {
 
 /** What is made a surface model of; told for sure by its content, on the server. */
 export const isCloud = (name: string) => /\.(las|laz|ply|pcd|e57)$/i.test(name);
-export const MODEL_FILES = ".tif,.tiff,.asc,.txt,.las,.laz,.ply,.pcd,.e57";
+export const MODEL_FILES = ".tif,.tiff,.asc,.txt,.zip,.las,.laz,.ply,.pcd,.e57";
 
 export const sending = signal<Sending[]>([]);
 /** Files by the job that reads them: kept so that a file can be sent again with what was missing. */
@@ -178,8 +178,20 @@ export function takeFiles(files: Iterable<File>): void {
 /** How an ArduPilot log begins: raw radar samples have the same ending. */
 const DATAFLASH = [0xa3, 0x95];
 
+/** The list of its files ends a ZIP. */
+const ZIP_TAIL_BYTES = 65_536;
+
+/** Whether the end of a ZIP names parts of a bag of ROS; any other is taken for tiles of a surface model. */
+export const namesBag = (tail: string) => /\.(bag|db3|mcap)|metadata\.yaml/i.test(tail);
+
+async function isBagArchive(file: File): Promise<boolean> {
+  const tail = await file.slice(Math.max(0, file.size - ZIP_TAIL_BYTES)).arrayBuffer();
+  return namesBag(new TextDecoder("latin1").decode(tail));
+}
+
 async function isRecording(file: File): Promise<boolean> {
-  if (!/\.bin$/i.test(file.name)) return /\.(tlog|mcap|ulg|bag|db3|zip)$/i.test(file.name);
+  if (/\.zip$/i.test(file.name)) return isBagArchive(file);
+  if (!/\.bin$/i.test(file.name)) return /\.(tlog|mcap|ulg|bag|db3)$/i.test(file.name);
   const head = new Uint8Array(await file.slice(0, DATAFLASH.length).arrayBuffer());
   return DATAFLASH.every((byte, index) => head[index] === byte);
 }
