@@ -17,7 +17,7 @@ from rasterio.windows import Window
 from mapping.geometry.arrays import F32
 from planning.terrain.rasters.byte_pipe import Asking, PipeFile
 from planning.terrain.rasters.header import RasterHeader
-from planning.terrain.rasters.mosaic import Mosaic, mosaic_of
+from planning.terrain.rasters.mosaic import mosaic_of
 
 Json = dict[str, Any]
 
@@ -57,7 +57,7 @@ def opened_grid(job: Json) -> Iterator[Grid]:
         ) as source:
             yield FileGrid(source, None)
     elif "tiles" in job:
-        with ExitStack() as stack:
+        with rasterio.Env(), ExitStack() as stack:  # one for all: each tile would make its own
             yield TileGrid(job["tiles"], stack)
     else:
         with rasterio.open(job["source"], driver=job["driver"]) as source:
@@ -98,13 +98,15 @@ class TileGrid:
                 headers.append((tile["name"], header_of(source)))
                 if not headers[:-1]:
                     self.block = source.block_shapes[0]
-        self._mosaic: Mosaic = mosaic_of(headers)
-        self.header = self._mosaic.header
+        mosaic = mosaic_of(headers)
+        self.header, self._spots = mosaic.header, mosaic.spots
+        self._edges = np.array([(s.row0, s.column0, s.row0 + s.rows, s.column0 + s.columns) for s in mosaic.spots])
 
     def heights(self, window: Window) -> F32:
         row0, column0, rows, columns = window.row_off, window.col_off, window.height, window.width
         out = np.full((rows, columns), np.nan, dtype=np.float32)
-        for number, spot in enumerate(self._mosaic.spots):
+        for number in self._touched(window):
+            spot = self._spots[number]
             if (shared := spot.shared(row0, column0, rows, columns)) is None:
                 continue
             (top, bottom), (left, right) = ((part.start, part.stop) for part in shared)
@@ -114,13 +116,18 @@ class TileGrid:
         return out
 
     def holds(self, window: Window) -> bool:
-        box = window.row_off, window.col_off, window.height, window.width
-        return any(spot.shared(*box) is not None for spot in self._mosaic.spots)
+        return bool(self._touched(window))
 
     def digest(self) -> str:
         """Of the tiles' own: neither their names nor their order change the ground."""
         own = sorted(digest_of(Path(tile["source"])) for tile in self._tiles)
         return hashlib.sha256("\n".join(own).encode()).hexdigest()
+
+    def _touched(self, window: Window) -> list[int]:
+        """Numbers of the tiles that reach into a window."""
+        top, left, bottom, right = self._edges.T
+        rows = (top < window.row_off + window.height) & (bottom > window.row_off)
+        return np.flatnonzero(rows & (left < window.col_off + window.width) & (right > window.col_off)).tolist()
 
     def _source(self, number: int) -> Any:
         if number not in self._open:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from secrets import token_hex
 from typing import Any
@@ -29,6 +29,8 @@ from planning.terrain.rasters.ranges import RemoteFile, check_is_tiff
 from planning.terrain.rasters.surface_plan import SurfacePlan, plan_surface
 from planning.terrain.rasters.tiles import tiles_of
 
+_TILE_HEADER_S = 0.02
+"""2 ms were measured."""
 Progress = Callable[[str, float], None]
 """Called with a stage ("decode", "resample", "spikes") and the share of it that is done."""
 
@@ -120,7 +122,7 @@ def read_surface(
         answer = sandbox.run_job(
             job,
             directory=directory,
-            limits=declared.limits,
+            limits=_with_time_for(job, declared.limits),
             where=source.name,
             on_header=order,
             progress=watched(progress, where=source.name),
@@ -160,6 +162,11 @@ def _squares_of(plan: SurfacePlan, cells: int) -> int:
     whole = plan.header.height_px * plan.header.width_px
     rows, columns = plan.grid[1] if plan.grid else (plan.header.height_px, plan.header.width_px)
     return rows * columns * cells // whole
+
+
+def _with_time_for(job: dict[str, Any], limits: RasterLimits) -> RasterLimits:
+    """Of a mosaic each tile's header is read first."""
+    return replace(limits, header_s=limits.header_s + _TILE_HEADER_S * len(job.get("tiles", ())))
 
 
 @contextmanager
