@@ -39,6 +39,8 @@ def unpacked_tiles(upload: Path, filename: str) -> Iterator[Path]:
                     # No more is unpacked of a member than its entry says, and that was counted.
                     with archive.open(member) as packed, (folder / _own_name(number, member)).open("xb") as out:
                         shutil.copyfileobj(packed, out, 2**20)
+        except RasterError:
+            raise  # in its own words, though it is a ValueError too
         except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, ValueError) as error:
             raise RasterFormatError(
                 f"This archive cannot be unpacked ({error}).",
