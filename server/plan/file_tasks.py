@@ -63,7 +63,7 @@ def import_terrain(
     keep_noise: bool,
     report: Progress,
 ) -> TerrainDoc:
-    """Reads an uploaded surface model, a file, a ZIP of tiles or a point cloud, into the library. Raises RasterError."""
+    """Reads an uploaded surface model, a file, tiles or a point cloud, into the library. Raises RasterError."""
     with named(upload, filename), _unpacked(upload, filename, report) as source:
         if is_cloud(upload):
             params = CloudParams(cell_m, crs, vertical_datum, z_scale, keep_noise)
