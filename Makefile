@@ -7,6 +7,7 @@ PYTEST_ARGS ?=
 LOCK_ARGS ?=
 TRUST_ARGS ?=
 SOAK_ARGS ?=
+PROOF_ARGS ?=
 
 STAMPS := .venv/.stamps
 VENV_PYTHON := .venv/bin/python
@@ -73,7 +74,7 @@ bench: $(STAMPS)/test ## measure the speed of the kernels and print it
 	@$(VENV_PYTHON) -m tests.bench
 
 proof: $(STAMPS)/test ## prove the certificates of over 200 missions by a slow independent measurement, print the table
-	@$(VENV_PYTHON) -m tests.proof
+	@$(VENV_PYTHON) -m tests.proof $(PROOF_ARGS)
 
 trust: $(STAMPS)/test $(STAMPS)/kernels ## try the promises of docs/security.md, print which hold (TRUST_ARGS=--help)
 	@$(VENV_PYTHON) -m tests.trust $(TRUST_ARGS)
@@ -89,7 +90,8 @@ wheel: $(STAMPS)/project web/dist/index.html ## build one wheel with the console
 lock: ## resolve the requirements files anew (LOCK_ARGS=--upgrade for newer versions)
 	@command -v $(UV) >/dev/null || { echo 'make lock needs uv: python3 -m pip install uv'; exit 1; }
 	$(COMPILE) pyproject.toml --group build --output-file requirements.txt
-	$(COMPILE) pyproject.toml --group build --extra test --constraint requirements.txt --output-file requirements-test.txt
+	$(COMPILE) pyproject.toml --group build --extra test --extra cluster --constraint requirements.txt --output-file requirements-test.txt
+	$(COMPILE) pyproject.toml --extra cluster --constraint requirements.txt --output-file requirements-cluster.txt
 	$(COMPILE) --group node --output-file requirements-node.txt
 	$(COMPILE) --no-deps --group peers --output-file requirements-peers.txt
 

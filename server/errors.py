@@ -22,6 +22,7 @@ ServerError
 │   └── DataDirError           not usable at all: refused at start
 ├── BusyError              too many pages or jobs, or shutting down
 ├── WorkerDiedError        the process that did the work ended (killed, out of memory)
+├── ClusterError           no cluster of that name, or one that cannot do the work
 ├── CertificateError       the console's certificate cannot be made, read or used
 └── StartError             settings or port that Hedgehop cannot start with
 
@@ -145,6 +146,10 @@ class WorkerDiedError(ServerError):
     code = "worker_died"
 
 
+class ClusterError(ServerError):
+    code = "cluster"
+
+
 class CertificateError(ServerError):
     code = "certificate"
 
@@ -169,6 +174,7 @@ STATUS: dict[type[Exception], int] = {
     StorageFullError: 507,
     BusyError: 503,
     WorkerDiedError: 500,
+    ClusterError: 503,
     CertificateError: 500,
     StartError: 503,
     TelemetryError: 502,

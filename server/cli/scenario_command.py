@@ -14,6 +14,7 @@ from server.cli.shared import options as o
 from server.cli.shared.command import DONE, FAILED, command
 from server.cli.shared.files_in_out import check_directory, check_new
 from server.cli.shared.output import end_progress, print_json, progress, say
+from server.work.cluster import spread
 from telemetry.simulation.scenarios.catalogue import NAMES, run_scenario
 from telemetry.simulation.scenarios.stage.result import ScenarioRequest, ScenarioResult, tally, tally_json
 from telemetry.topics.vehicle import RadarKind
@@ -47,6 +48,7 @@ def scenario(
     plots: Annotated[
         Path | None, Option(metavar="DIR", help="Draw what of it is a curve, such as the ROC of foliage.")
     ] = None,
+    cluster: o.Cluster = None,
     as_json: o.AsJson = False,
 ) -> None:
     """Fly one of the papers' field tests in simulation and measure what the sensors' maps and alerts are worth.
@@ -56,11 +58,18 @@ def scenario(
     _check(name, record, seed, seeds)
     own = _own(name, radar, figures or [])
     _check_plots(plots, seeds)
+    world = o.existing(world)
+    wanted = [
+        (name, ScenarioRequest(number, world, radar, own, record, charts=plots is not None))
+        for number in range(seed, seed + seeds)
+    ]
     results: list[ScenarioResult] = []
-    for number in range(seed, seed + seeds):
-        progress(f"Flying {name}, seed {number}", len(results) / seeds if seeds > 1 else None)
-        wanted = ScenarioRequest(number, o.existing(world), radar, own, record, charts=plots is not None)
-        results.append(run_scenario(name, wanted))
+
+    def flying(share: float) -> None:
+        progress(f"Flying {name}", share if seeds > 1 else None)
+
+    for result in spread(_fly, wanted, cluster, flying):
+        results.append(result)
         end_progress()
         if not as_json:
             typer.echo("\n".join(results[-1].lines()))
@@ -71,6 +80,10 @@ def scenario(
     elif seeds > 1:
         typer.echo("\n".join(tally(results)))
     raise typer.Exit(DONE if all(result.passed for result in results) else FAILED)
+
+
+def _fly(wanted: tuple[str, ScenarioRequest]) -> ScenarioResult:
+    return run_scenario(*wanted)
 
 
 def _draw(plots: Path, result: ScenarioResult) -> None:

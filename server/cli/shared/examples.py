@@ -181,5 +181,6 @@ BENCH = _examples(("Best of five, ratios in one run", "hedgehop bench"))
 SCENARIO = _examples(
     ("A building in the way, by each sensor alone, at night and without GNSS", "hedgehop scenario castle-building"),
     ("Fifty seeds, for a script", "hedgehop scenario castle-building --seeds 50 --json > castle.json"),
+    ("A thousand, on all cores", "hedgehop scenario castle-building --seeds 1000 --cluster local"),
     ("Objects of your own, the flight kept on file", "hedgehop scenario wood --world park.json --record park.mcap"),
 )

@@ -40,6 +40,14 @@ Keys = Annotated[
     Option(metavar="DIR", help="Sign as the Hedgehop of this data directory does, and keep the log of commands there."),
 ]
 Out = Annotated[Path, Option(metavar="DIR", help="Directory for the files.")]
+Cluster = Annotated[
+    str | None,
+    Option(
+        metavar="local|ADDRESS",
+        help="Spread over Dask workers: local (a process for each core), local:N, or a scheduler's tls://HOST:PORT. "
+        "Needs hedgehop[cluster].",
+    ),
+]
 AsJson = Annotated[bool, Option("--json", help="Print one JSON object on stdout, messages on stderr.")]
 
 

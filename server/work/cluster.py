@@ -1,0 +1,208 @@
+"""Work spread over Dask workers, or done here one piece after another: the same answers, in the same order.
+
+The only module that knows Dask, which is an extra (``hedgehop[cluster]``) and loaded when it is asked for. A worker
+that dies loses nothing: its piece is done again by another. No more pieces are on their way than keep all workers
+busy, so that neither they nor this process hold what nobody has fetched yet.
+"""
+
+from __future__ import annotations
+
+import importlib
+import logging
+import os
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, TypeVar
+from urllib.parse import urlsplit
+
+from planning import __version__
+from server.errors import ClusterError, WorkerDiedError
+
+A = TypeVar("A")
+R = TypeVar("R")
+Done = Callable[[float], None]
+
+LOCAL = "local"
+MOST_LOCAL_WORKERS = 256
+PER_WORKER = 4
+"""Pieces on their way for each worker: one in work, the others so that it never waits."""
+_JOIN_S, _TOLD_EVERY_S = 30.0, 0.5
+_LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
+
+
+def spread(function: Callable[[A], R], pieces: Sequence[A], where: str | None, done: Done) -> Iterator[R]:
+    """``function`` of each piece, in the pieces' order; ``done(share)`` is told how many are finished.
+
+    ``function`` is found by its module on a worker, so it and the pieces must pickle; files that it reads must lie
+    there at the same path. ``where``: None here, ``local`` or ``local:N`` processes of this machine, or the
+    ``tls://HOST:PORT`` of a Dask scheduler. Raises ClusterError, WorkerDiedError, and whatever ``function`` raises.
+    """
+    if where is None:
+        for number, piece in enumerate(pieces):
+            done(number / len(pieces))
+            yield function(piece)
+        return
+    with _client(where) as client:
+        yield from _in_order(client, function, pieces, done)
+
+
+def check_where(where: str) -> None:
+    """Raises ClusterError for what names no cluster, before anything is begun."""
+    if where == LOCAL or where.startswith(f"{LOCAL}:"):
+        _local_workers(where)
+    else:
+        _check_address(where)
+
+
+def _in_order(client: Any, function: Callable[[A], R], pieces: Sequence[A], done: Done) -> Iterator[R]:
+    from distributed import KilledWorker
+
+    waiting: deque[Any] = deque()
+    unbegun = deque(pieces)
+
+    def tell() -> None:
+        left = len(unbegun) + sum(not future.done() for future in waiting)
+        done(1.0 - left / len(pieces))
+
+    try:
+        while unbegun or waiting:
+            # Workers may have joined since.
+            room = PER_WORKER * max(1, sum(client.nthreads().values()))
+            while unbegun and len(waiting) < room:
+                waiting.append(client.submit(function, unbegun.popleft(), pure=False))
+            yield _answer(waiting[0], tell)
+            waiting.popleft()
+    except KilledWorker as error:
+        raise WorkerDiedError(
+            "Every worker that took up this piece of the work ended unexpectedly, perhaps for lack of memory.",
+            where=f"piece {len(pieces) - len(unbegun) - len(waiting) + 1} of {len(pieces)}",
+            advice="Use fewer workers with more memory each, or leave --cluster away to see it fail here.",
+        ) from error
+    finally:
+        client.cancel(list(waiting), force=True)
+
+
+def _answer(future: Any, tell: Callable[[], None]) -> Any:
+    """Raises what the piece raised, ClusterError when the scheduler is gone."""
+    from distributed import CancelledError
+
+    while True:
+        tell()
+        try:
+            return future.result(timeout=_TOLD_EVERY_S)
+        except TimeoutError:
+            if future.status == "error":
+                raise  # the piece's own
+        except (CancelledError, OSError) as error:
+            if future.status == "error":
+                raise
+            raise ClusterError(
+                "The scheduler of the cluster does not answer any more.",
+                advice="Start it again, and the command: what was not written yet is done anew.",
+            ) from error
+
+
+@contextmanager
+def _client(where: str) -> Iterator[Any]:
+    check_where(where)
+    try:
+        distributed = importlib.import_module("distributed")
+    except ModuleNotFoundError as error:
+        raise ClusterError(
+            "Dask is not installed.",
+            where="--cluster",
+            advice="Install it: pip install 'hedgehop[cluster]', or leave --cluster away.",
+        ) from error
+    # It logs every connection that closes as it ends.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    if where == LOCAL or where.startswith(f"{LOCAL}:"):
+        with (
+            distributed.LocalCluster(
+                n_workers=_local_workers(where),
+                threads_per_worker=1,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",
+                # Whoever reaches a scheduler runs code: other users of this machine have no key to it.
+                security=distributed.Security.temporary(),
+                silence_logs=logging.CRITICAL,
+                env={"NUMBA_NUM_THREADS": "1"},
+            ) as cluster,
+            distributed.Client(cluster) as client,
+        ):
+            yield client
+        return
+    try:
+        client = distributed.Client(where, timeout=_JOIN_S, set_as_default=False)
+    except (OSError, TimeoutError, ValueError, TypeError, RuntimeError) as error:
+        raise ClusterError(
+            f"No Dask scheduler is reached: {error}.",
+            where=where,
+            advice="Start it: dask scheduler. For tls:// Dask needs its keys, distributed.comm.tls in its settings.",
+        ) from error
+    with client:
+        _check_workers(client, where)
+        yield client
+
+
+def _local_workers(where: str) -> int:
+    _, colon, count = where.partition(":")
+    if not colon:
+        return len(os.sched_getaffinity(0))
+    if not (count.isascii() and count.isdigit() and 1 <= int(count) <= MOST_LOCAL_WORKERS):
+        raise ClusterError(
+            f'"{count}" is no number of workers.', where="--cluster", advice=f"Give local:1 to {MOST_LOCAL_WORKERS}."
+        )
+    return int(count)
+
+
+def _check_address(where: str) -> None:
+    try:
+        parts = urlsplit(where)
+        port = parts.port
+    except ValueError:
+        parts, port = urlsplit(""), None
+    if parts.scheme not in ("tls", "tcp") or not parts.hostname or not port or parts.path or parts.username:
+        raise ClusterError(
+            f'"{where}" names no cluster.',
+            where="--cluster",
+            advice="Give local, local:N, or the scheduler's address, such as tls://10.0.0.5:8786.",
+        )
+    if parts.scheme == "tcp" and parts.hostname not in _LOOPBACK:
+        raise ClusterError(
+            "Over tcp:// anyone in that network could run programs on the workers and here.",
+            where="--cluster",
+            advice="Start scheduler and workers with TLS and give tls://; tcp:// is for this machine alone.",
+        )
+
+
+def _check_workers(client: Any, where: str) -> None:
+    try:
+        client.wait_for_workers(1, timeout=_JOIN_S)
+    except TimeoutError as error:
+        raise ClusterError(
+            "No worker has joined this scheduler.", where=where, advice="Start some: dask worker ADDRESS."
+        ) from error
+    ours = installed()
+    try:
+        theirs = client.run(installed)
+    except ModuleNotFoundError as error:
+        raise ClusterError(
+            f"A worker lacks a package: {error}.", where=where, advice="Install Hedgehop on it, as it is here."
+        ) from error
+    for worker, found in theirs.items():
+        if found != ours:
+            other = "; ".join(f"{name} {found[name]}, here {ours[name]}" for name in ours if found[name] != ours[name])
+            raise ClusterError(
+                f"The worker {worker} would not answer as this machine does: {other}.",
+                where=where,
+                advice="Install the same versions on all of them.",
+            )
+
+
+def installed() -> dict[str, str]:
+    """What decides about the bytes of an answer, each with its version."""
+    import numba
+    import numpy as np
+
+    return {"Hedgehop": __version__, "numpy": np.__version__, "numba": numba.__version__}
