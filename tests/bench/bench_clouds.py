@@ -70,7 +70,7 @@ def _by_scipy(path: Path) -> NDArray[np.float64]:
     west, north = np.floor(x.min() / CELL_M) * CELL_M, np.ceil(y.max() / CELL_M) * CELL_M
     columns = int((x.max() - west) / CELL_M) + 1
     rows = int((north - y.min()) / CELL_M) + 1
-    edges = [np.arange(count + 1) * CELL_M for count in (rows, columns)]
+    edges: Any = [np.arange(count + 1) * CELL_M for count in (rows, columns)]
     top, *_ = binned_statistic_2d(north - y, x - west, z, statistic="max", bins=edges)
     return top
 

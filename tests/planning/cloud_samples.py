@@ -64,7 +64,8 @@ def write_copc(path: Path, xyz: F64, classes: U8) -> Path:
     plain.x, plain.y, plain.z = xyz.T
     plain.classification = classes
     plain.write(str(path.with_suffix(".las")))
-    vlr = lazrs.LazVlr.new_for_compression(6, 0, True)
+    packer: Any = lazrs  # compiled; its stubs lack the writer
+    vlr = packer.LazVlr.new_for_compression(6, 0, True)
     with laspy.open(path.with_suffix(".las")) as file:
         rows, header = file.read(), file.header
     header.vlrs.append(laspy.VLR("copc", 1, "COPC info", bytes(160)))
@@ -75,7 +76,7 @@ def write_copc(path: Path, xyz: F64, classes: U8) -> Path:
         header.are_points_compressed = True
         header.update(rows.points)
         header.write_to(out)
-        compressor = lazrs.LasZipCompressor(out, vlr)
+        compressor = packer.LasZipCompressor(out, vlr)
         for first, end in pairwise((0, len(xyz) // 7, len(xyz) // 2, len(xyz))):
             compressor.compress_many(raw[first * size : end * size])
             if end < len(xyz):

@@ -46,6 +46,8 @@ def imported(root: Path, upload: Path) -> TerrainDoc:
         z_scale=None,
         vertical_datum=None,
         remove_spikes=False,
+        cell_m=None,
+        keep_noise=False,
         report=lambda step, share: None,
     )
 
