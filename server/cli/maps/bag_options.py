@@ -49,7 +49,7 @@ def as_recording(path: Path, sensor: Sensor, given: BagOptions, *, placed: str |
     ``placed``: what must lie somewhere on Earth; None: nothing must.
     """
     if bag_kind(path) is None:
-        _refuse_for_recordings(path, given)
+        refuse_for_recordings(path, given)
         yield path
         return
     path = path.resolve()  # "." has no name
@@ -78,7 +78,7 @@ def _written(path: Path, sensor: Sensor, given: BagOptions, out: Path) -> BagFli
     return flight
 
 
-def _refuse_for_recordings(path: Path, given: BagOptions) -> None:
+def refuse_for_recordings(path: Path, given: BagOptions) -> None:
     other = [field.name for field in fields(given) if getattr(given, field.name) != field.default]
     if other:
         names = ", ".join(f"--{name.replace('_', '-')}" for name in other)

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
-import time
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import typer
 from typer import Argument, Option
 
 from mapping.errors import ParameterError
 from planning.errors import DescribedError
-from server.cli.maps.bag_options import BagOptions, as_recording
+from server.cli.maps.bag_options import BagOptions, as_recording, refuse_for_recordings
+from server.cli.maps.made_map import MapOrder, lines_of, made_map, make_all
 from server.cli.shared import options as o
-from server.cli.shared.command import command
+from server.cli.shared.command import DONE, FAILED, command
 from server.cli.shared.output import answer, end_progress, progress, say_notes
 from telemetry.perception.rebuilding.export import KINDS as FORMATS
-from telemetry.perception.rebuilding.export import ExportError, Kind, exported
-from telemetry.perception.rebuilding.rebuild import OtherMap, Rebuilt, rebuild
-from telemetry.perception.sensor_kinds import KINDS, check_memory
+from telemetry.perception.rebuilding.export import Kind
+from telemetry.perception.rebuilding.rebuild import OtherMap
+from telemetry.perception.sensor_kinds import check_memory
 
 NO_BAG = BagOptions()
 ON_EARTH = frozenset({"tif", "geojson"})
@@ -33,10 +34,17 @@ class MapFileError(DescribedError):
 
 @command
 def build_map(
-    recording: Annotated[Path, Argument(metavar="RECORDING", help="A recording of Hedgehop (.mcap), or a bag of ROS.")],
+    recording: Annotated[
+        Path,
+        Argument(metavar="RECORDING", help="A recording of Hedgehop (.mcap), or a bag of ROS; with --all a folder."),
+    ],
     sensor: Annotated[Literal["radar", "vision", "ranges"], Option(help="Whose map.")],
     out: Annotated[
-        Path, Option(metavar="FILE", help="Ends with .ply, .pcd, .bt, .mcap (octomap_msgs), .tif or .geojson.")
+        Path,
+        Option(
+            metavar="FILE",
+            help="Ends with .ply, .pcd, .bt, .mcap (octomap_msgs), .tif or .geojson; with --all a folder.",
+        ),
     ],
     resolution_m: Annotated[float | None, Option(metavar="M", help="Edge of a voxel; default: as in flight.")] = None,
     memory_mb: Annotated[
@@ -62,15 +70,13 @@ def build_map(
     whole_flight: Annotated[
         bool, Option("--whole-flight", help="Of the camera: all that it saw on its way, not its last frame alone.")
     ] = False,
+    of_all: Annotated[bool, Option("--all", help="Of every recording of Hedgehop in the folder.")] = False,
+    form: Annotated[str | None, Option("--format", metavar="NAME", help="With --all; default: ply.")] = None,
+    cluster: o.Cluster = None,
     bag: BagOptions = NO_BAG,
     as_json: o.AsJson = False,
 ) -> None:
     """Build a recording's map of obstacles again, exactly as it was in flight or otherwise; or that of a bag of ROS."""
-    kind: Kind | None = next((name for name in FORMATS if out.suffix.lower() == f".{name}"), None)
-    if kind is None:
-        what = f"{out.suffix or 'No ending'} is no format of maps."
-        raise MapFileError(what, where=out.name, advice="Choose .ply, .pcd, .bt, .mcap, .tif or .geojson.")
-    began_s = time.monotonic()
     other = OtherMap(
         resolution_m,
         _limit_bytes(memory_mb),
@@ -81,23 +87,31 @@ def build_map(
         cloud_voxel_m,
         whole_flight,
     )
+    if of_all:
+        refuse_for_recordings(recording, bag)
+        entries = make_all(recording, out, sensor, _kind(form or "ply", "--format"), other, cluster)
+        made = [entry for entry in entries if "error" not in entry]
+        lines = [line for entry in made for line in lines_of(entry, Path(entry["file"]))]
+        answer({"maps": entries}, [*lines, f"{len(made)} of {len(entries)} recordings have a map."], as_json=as_json)
+        raise typer.Exit(DONE if len(made) == len(entries) else FAILED)
+    if form is not None or cluster is not None:
+        what = "--format and --cluster mean something with --all only."
+        raise ParameterError(what, where="--all", advice="Name the file by its format, and leave both out.")
+    kind = _kind(out.suffix.lower().removeprefix("."), out.name)
     with as_recording(recording, sensor, bag, placed=f"a .{kind}" if kind in ON_EARTH else None) as flight:
-        built = rebuild(flight, KINDS[sensor], other=other, progress=lambda share: progress("Building the map", share))
+        made_one = made_map(MapOrder(flight, sensor, kind, other), lambda share: progress("Building the map", share))
     end_progress()
-    say_notes(*built.notes)
-    _check_not_empty(built, recording)
-    out.write_bytes(exported(kind, built.folded))
-    answer(_summary(built, time.monotonic() - began_s), _lines(built, out), as_json=as_json)
+    say_notes(*made_one.notes)
+    out.write_bytes(made_one.data)
+    answer(made_one.summary, lines_of(made_one.summary, out), as_json=as_json)
 
 
-def _check_not_empty(built: Rebuilt, recording: Path) -> None:
-    if built.voxels_occupied == 0:
-        raise ExportError(
-            f"The map is empty: {built.frames:,} frames with {built.points:,} points went into it, "
-            f"{built.dropped:,} were not taken.",
-            where=recording.name,
-            advice="Choose another sensor, or a recording in which something was seen.",
-        )
+def _kind(name: str, where: str) -> Kind:
+    kind: Kind | None = next((known for known in FORMATS if known == name), None)
+    if kind is None:
+        what = f"{name or 'No ending'} is no format of maps."
+        raise MapFileError(what, where=where, advice=f"Choose {', '.join(f'.{known}' for known in FORMATS)}.")
+    return kind
 
 
 def _variant(name: str | None) -> Any:
@@ -113,25 +127,3 @@ def _limit_bytes(memory_mb: float | None) -> int | None:
     limit_bytes = round(memory_mb * 1e6)
     check_memory(limit_bytes, maps=1)
     return limit_bytes
-
-
-def _lines(built: Rebuilt, out: Path) -> list[str]:
-    east_m, north_m, up_m = built.extent_m
-    size = f"{east_m:.0f} x {north_m:.0f} x {up_m:.0f} m"
-    return [
-        f"{out.name}: {built.voxels_occupied:,} occupied voxels of {built.resolution_m:g} m in {size}",
-        f"  of {built.frames:,} frames with {built.points:,} points; {built.dropped:,} frames were not taken",
-    ]
-
-
-def _summary(built: Rebuilt, seconds: float) -> dict[str, Any]:
-    return {
-        "frames": built.frames,
-        "dropped": built.dropped,
-        "points": built.points,
-        "voxels_occupied": built.voxels_occupied,
-        "resolution_m": built.resolution_m,
-        "left_out": built.left_out,
-        "extent_m": list(built.extent_m),
-        "seconds": round(seconds, 3),
-    }

@@ -131,6 +131,10 @@ REVIEW = _examples(
 MAP = _examples(
     ("What the radar saw, for a point cloud viewer", "hedgehop map flight.mcap --sensor radar --out radar.ply"),
     ("The highest obstacles as a raster", "hedgehop map flight.mcap --sensor radar --out radar.tif --json"),
+    (
+        "Of every flight of a season, on all cores",
+        "hedgehop map flights --all --sensor radar --out maps",
+    ),
     ("Of a robot's bag", "hedgehop map run.bag --sensor radar --points /radar/points --pose /odom --out radar.ply"),
 )
 BAG = _examples(
