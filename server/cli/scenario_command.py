@@ -56,9 +56,16 @@ def scenario(
     Virtual time: the same seed gives the same flight. The exit code is 1 when a figure is not reached.
     """
     _check(name, record, seed, seeds)
+    if record is not None and cluster is not None:
+        raise ParameterError(
+            "A worker would keep the flight where it runs.",
+            where="--record",
+            advice="Leave --cluster away, or --record.",
+        )
     own = _own(name, radar, figures or [])
     _check_plots(plots, seeds)
     world = o.existing(world)
+    world = None if world is None else world.absolute()
     wanted = [
         (name, ScenarioRequest(number, world, radar, own, record, charts=plots is not None))
         for number in range(seed, seed + seeds)

@@ -7,12 +7,17 @@ busy, so that neither they nor this process hold what nobody has fetched yet.
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import logging
 import os
+import socket
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
+from importlib import metadata
+from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
@@ -28,6 +33,7 @@ MOST_LOCAL_WORKERS = 256
 PER_WORKER = 4
 """Pieces on their way for each worker: one in work, the others so that it never waits."""
 _JOIN_S, _TOLD_EVERY_S = 30.0, 0.5
+_DECIDE = ("numpy", "numba", "scipy", "rasterio", "pyproj")
 _LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
 
 
@@ -70,7 +76,7 @@ def _in_order(client: Any, function: Callable[[A], R], pieces: Sequence[A], done
             # Workers may have joined since.
             room = PER_WORKER * max(1, sum(client.nthreads().values()))
             while unbegun and len(waiting) < room:
-                waiting.append(client.submit(function, unbegun.popleft(), pure=False))
+                waiting.append(client.submit(_answered, function, unbegun.popleft(), installed(), pure=False))
             yield _answer(waiting[0], tell)
             waiting.popleft()
     except KilledWorker as error:
@@ -134,9 +140,9 @@ def _client(where: str) -> Iterator[Any]:
         return
     try:
         client = distributed.Client(where, timeout=_JOIN_S, set_as_default=False)
-    except (OSError, TimeoutError, ValueError, TypeError, RuntimeError) as error:
+    except Exception as error:  # it gives up in any way: no answer, no key, an attempt that it cancelled itself
         raise ClusterError(
-            f"No Dask scheduler is reached: {error}.",
+            f"No Dask scheduler is reached ({type(error).__name__}: {error}).",
             where=where,
             advice="Start it: dask scheduler. For tls:// Dask needs its keys, distributed.comm.tls in its settings.",
         ) from error
@@ -183,26 +189,39 @@ def _check_workers(client: Any, where: str) -> None:
         raise ClusterError(
             "No worker has joined this scheduler.", where=where, advice="Start some: dask worker ADDRESS."
         ) from error
-    ours = installed()
     try:
-        theirs = client.run(installed)
+        client.run(check_same, installed())
     except ModuleNotFoundError as error:
         raise ClusterError(
             f"A worker lacks a package: {error}.", where=where, advice="Install Hedgehop on it, as it is here."
         ) from error
-    for worker, found in theirs.items():
-        if found != ours:
-            other = "; ".join(f"{name} {found[name]}, here {ours[name]}" for name in ours if found[name] != ours[name])
-            raise ClusterError(
-                f"The worker {worker} would not answer as this machine does: {other}.",
-                where=where,
-                advice="Install the same versions on all of them.",
-            )
 
 
+def _answered(function: Callable[[A], R], piece: A, asked_with: dict[str, str]) -> R:
+    """On the worker, which may have joined after the others were looked at."""
+    check_same(asked_with)
+    return function(piece)
+
+
+def check_same(asked_with: dict[str, str]) -> None:
+    """Raises ClusterError on a machine whose answers may not be those of the one that asks."""
+    here = installed()
+    other = [f"{name} {here[name]}, asked with {wanted}" for name, wanted in asked_with.items() if here[name] != wanted]
+    if other:
+        raise ClusterError(
+            f"This worker would not answer as the machine that asks: {'; '.join(other)}.",
+            where=socket.gethostname(),
+            advice="Install the same versions on all of them.",
+        )
+
+
+@cache
 def installed() -> dict[str, str]:
-    """What decides about the bytes of an answer, each with its version."""
-    import numba
-    import numpy as np
-
-    return {"Hedgehop": __version__, "numpy": np.__version__, "numba": numba.__version__}
+    """What decides about the bytes of an answer: versions, and a digest of our own sources."""
+    digest = hashlib.sha256()
+    root = Path(__file__).parents[2]
+    for floor in ("mapping", "planning", "telemetry", "server"):
+        for source in sorted((root / floor).rglob("*.py")):
+            digest.update(source.relative_to(root).as_posix().encode() + source.read_bytes())
+    own = f"{__version__} ({digest.hexdigest()[:12]})"
+    return {"Hedgehop": own, **{name: metadata.version(name) for name in _DECIDE}}

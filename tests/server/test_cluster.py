@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import dask
 import distributed
 import numpy as np
 import pytest
@@ -17,7 +18,8 @@ from mapping.traversability import traversability_map
 from planning.errors import PoiError
 from server.errors import ClusterError, WorkerDiedError
 from server.work import cluster
-from server.work.cluster import check_where, spread
+from server.work.cluster import check_where, installed, spread
+from tests.server.cluster_keys import write_keys
 
 pytestmark = pytest.mark.xdist_group("cluster")
 
@@ -105,7 +107,8 @@ def test_a_worker_that_dies_loses_nothing_and_a_piece_that_ends_every_worker_is_
             list(spread(_die, [0], mortal, lambda share: None))
 
 
-def test_processes_of_its_own_have_keys_of_their_own() -> None:
+def test_processes_of_its_own_have_keys_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "_JOIN_S", 2.0)
     answers = spread(_worked_out, [0, 1, 2], "local:2", lambda share: None)
     first = next(answers)
     (running,) = [one for one in distributed.Client._instances if one.status == "running"]
@@ -126,10 +129,35 @@ def test_a_scheduler_that_is_not_there_or_has_no_worker_is_said(monkeypatch: pyt
         list(spread(_worked_out, [0], empty, lambda share: None))
 
 
-def test_a_worker_of_another_version_is_refused(scheduler: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cluster, "__version__", "0.0.1")
-    with pytest.raises(ClusterError, match=r"would not answer as this machine does: Hedgehop .*, here 0\.0\.1"):
+def test_a_worker_of_another_version_is_refused_also_if_it_joins_later(
+    scheduler: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ours = installed()
+    monkeypatch.setattr(cluster, "installed", lambda: ours | {"Hedgehop": "0.0.1"})
+    with pytest.raises(
+        ClusterError, match=r"would not answer as the machine that asks: Hedgehop .*, asked with 0\.0\.1"
+    ):
         list(spread(_worked_out, [0], scheduler, lambda share: None))
+    monkeypatch.setattr(cluster, "_check_workers", lambda client, where: None)
+    with pytest.raises(ClusterError, match="would not answer"):
+        list(spread(_worked_out, [0], scheduler, lambda share: None))
+
+
+def test_one_scheduler_is_reached_by_tls_with_keys_for_both_sides(tmp_path: Path) -> None:
+    keys = write_keys(tmp_path)
+    running = distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0", silence_logs=50,
+        protocol="tls://", security=distributed.Security(require_encryption=True, **keys),
+    )  # fmt: skip
+    settings = {"distributed.comm.tls.ca-file": keys["tls_ca_file"]}
+    settings |= {f"distributed.comm.tls.client.{part}": keys[f"tls_client_{part}"] for part in ("cert", "key")}
+    try:
+        address = running.scheduler_address
+        assert address.startswith("tls://")
+        with dask.config.set(settings):
+            assert list(spread(_worked_out, [0, 1], address, lambda share: None)) == [_worked_out(0), _worked_out(1)]
+    finally:
+        running.close()
 
 
 def test_without_dask_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
