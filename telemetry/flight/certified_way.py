@@ -164,11 +164,13 @@ def way_request(
         GuidedTarget(NO_ITEM, lat_deg, lon_deg, up_m, speed_m_s, heading_rad=_heading(wish, (lat_deg, lon_deg)))
         for lat_deg, lon_deg, up_m in way.places[1:]
     )
+    spare_m = max(0.0, way.clearance_m - way.certificate.required_clearance_m)
     if isinstance(wish, TakeOff):
         lat_deg, lon_deg, _ = way.places[0]
-        up_m = way.places[-1][2]
-        return StartGuided(operator, targets, up_m, end="hold", begins_lat_deg=lat_deg, begins_lon_deg=lon_deg)
-    return FlyWay(operator, targets, *way.places[0], most_m_s, end="land" if isinstance(wish, RETURNS) else "hold")
+        begins, up_m = {"begins_lat_deg": lat_deg, "begins_lon_deg": lon_deg}, way.places[-1][2]
+        return StartGuided(operator, targets, up_m, end="hold", spare_m=spare_m, **begins)
+    end = "land" if isinstance(wish, RETURNS) else "hold"
+    return FlyWay(operator, targets, *way.places[0], most_m_s, end=end, spare_m=spare_m)
 
 
 def _heading(wish: Wish, at_deg: tuple[float, float]) -> float | None:

@@ -13,6 +13,8 @@ from telemetry.topics.vehicle import VehicleState
 
 MOVED_M, ROSE_M = 1.0, 0.5
 """Less is what receivers and barometers wander, and autopilots follow."""
+CORRECTED_M = 2.0
+"""Up to here PX4 may correct home's height in flight, by its receiver: 1.2 m were measured."""
 EIGHTHS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 WHAT_TO_DO = (
     "The ways home are certified for the home before. Hold, then certify the rest from here (Fly, On board),"
@@ -48,12 +50,29 @@ def is_there(home: HomePlace | None, wanted: HomePlace) -> bool:
     return home is not None and moved_words(wanted, home) is None
 
 
+def follows_m(state: VehicleState) -> float:
+    """By how much the autopilot may correct home's height in flight."""
+    return CORRECTED_M if state.autopilot == "px4" else ROSE_M
+
+
 class HomeWatch:
     """Of one flight after the other."""
 
     def __init__(self) -> None:
         self._home: HomePlace | None = None
+        self._certified: HomePlace | None = None
+        """Home that the flight began with, or that was ordered since."""
         self._ordered: HomePlace | None = None
+        self._follows_m = ROSE_M
+
+    @property
+    def is_elsewhere(self) -> bool:
+        """Farther away than the autopilot itself corrects it."""
+        home, before = self._home, self._certified
+        if home is None or before is None:
+            return False
+        away_m = math.hypot(*offset_m((before.lat_deg, before.lon_deg), home.lat_deg, home.lon_deg))
+        return not (away_m <= MOVED_M and abs(home.alt_amsl_m - before.alt_amsl_m) <= self._follows_m)
 
     def expect(self, ordered: HomePlace | None) -> None:
         """Home that comes there moves by our own order; None: nothing is ordered."""
@@ -62,14 +81,15 @@ class HomeWatch:
     def on_state(self, state: VehicleState) -> str | None:
         """What is to be said at once, each time that home has moved since it was last said."""
         if not (state.armed and is_in_the_air(state)):
-            self._home = None
+            self._home = self._certified = None
             return None
         home = home_of(state)
         if home is None or self._home is None:
-            self._home = home or self._home
+            self._home = self._certified = home or self._home
             return None
+        self._follows_m = follows_m(state)
         if self._ordered is not None and is_there(home, self._ordered):
-            self._home = home
+            self._home = self._certified = home
             return None
         words = moved_words(self._home, home)
         if words is not None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-import time
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
 
@@ -17,17 +16,17 @@ from mapping.geometry.frames import apart_m
 from planning.basics.mav_cmd import MavCmd
 from planning.formats.commands import FLOWN_TO
 from telemetry.errors import MissionUnknownError, NotAllowedError, RefusedError, SilentError, TelemetryError
-from telemetry.flight.guided.beginning import why_moves, why_not_from
+from telemetry.flight.guided.beginning import why_moves
 from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_from
 from telemetry.link.adopted import AdoptedVehicle
-from telemetry.link.onboard import OnBoard, Started
+from telemetry.link.onboard import OnBoard, check_same_mission
 from telemetry.link.procedures import see_home_here
-from telemetry.mavlink.autopilot_orders import HOLD_MODES, MISSION_MODES
+from telemetry.mavlink.autopilot_orders import HOLD_MODES
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import sequence_of
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.onboard_lists import Item, OnboardMission
-from telemetry.topics.requests import FlyWay, StartAuto, TakeUp
+from telemetry.topics.requests import StartAuto
 from telemetry.topics.vehicle import VehicleState
 
 ARMED_WITHIN_S = 10.0
@@ -45,24 +44,6 @@ PATIENCE_S = 30.0
 MODE_SHOWS_S = 5.0
 GUIDED = "GUIDED"
 FIRST = 1
-UNKNOWN_MISSION = "unknown"
-"""No digest is this."""
-OTHER_PLACES = "other places"
-"""No digest is this: the mission was started with another fence, or other rally points."""
-OTHER_HOME = "another home"
-"""No digest is this: home was set elsewhere since, from where its heights count."""
-HOME_MOVED = (
-    "The mission on board was certified for the home before: its heights count from the new one. The vehicle holds."
-    " Certify the rest from here (Fly, On board), return home, or land."
-)
-FOREIGN_MISSION = (
-    "The mission on board is not the one that was started any more: another ground station has written to it."
-    " The vehicle holds. Return home or land."
-)
-NOT_TAKEN_UP = (
-    "The vehicle began to fly what was sent to it from here in this flight and was not taken up: somebody else"
-    " changed its mode. The vehicle holds. Take the plan up again, return home or land."
-)
 
 
 async def start_mission(vehicle: AdoptedVehicle, digest: str, read_mission: ReadMission) -> None:
@@ -78,7 +59,8 @@ async def start_mission(vehicle: AdoptedVehicle, digest: str, read_mission: Read
     if vehicle.firmware == "ardupilot":
         await vehicle.obey(orders.mode("GUIDED"))
         await _arm(vehicle)
-        await _check_or_disarm(vehicle, digest, read_mission)
+        await _or_disarm(vehicle, check_again(vehicle.onboard, digest, read_mission))
+        await _or_disarm(vehicle, see_home_here(vehicle))
         await _send_off(vehicle)
     else:
         await vehicle.obey(orders.mission_mode())
@@ -109,10 +91,9 @@ async def _see_armed(vehicle: AdoptedVehicle) -> None:
     await vehicle.wait_until(lambda state: state.armed, timeout_s=ARMED_WITHIN_S, what="arm")
 
 
-async def _check_or_disarm(vehicle: AdoptedVehicle, digest: str, read_mission: ReadMission) -> None:
+async def _or_disarm(vehicle: AdoptedVehicle, check: Awaitable[None]) -> None:
     try:
-        await check_again(vehicle.onboard, digest, read_mission)
-        await see_home_here(vehicle)
+        await check
     except TelemetryError:
         with contextlib.suppress(TelemetryError):  # it switches its motors off by itself soon
             await vehicle.obey(vehicle.orders.disarm())
@@ -122,17 +103,6 @@ async def _check_or_disarm(vehicle: AdoptedVehicle, digest: str, read_mission: R
 async def _arm(vehicle: AdoptedVehicle) -> None:
     if not vehicle.state.armed:
         await vehicle.obey(vehicle.orders.arm())
-
-
-def check_same_mission(onboard: OnBoard, digest: str) -> None:
-    """Raises MissionUnknownError when another station may have replaced what was checked."""
-    if onboard.digest == digest:
-        return
-    what = "What is on board is not known any more" if onboard.digest is None else "Another mission is on board"
-    raise MissionUnknownError(
-        f"{what}: it was replaced since it was checked.",
-        advice="Return home, then upload the plan and check it again.",
-    )
 
 
 async def check_again(onboard: OnBoard, digest: str, read_mission: ReadMission) -> None:
@@ -179,86 +149,6 @@ def check_holds(state: VehicleState, *, is_led: bool) -> None:
         raise NotAllowedError(what, advice="Hold first: what is on board is replaced only then.")
     if (refusal := why_moves(state)) is not None:
         raise refusal
-
-
-def check_begins(request: TakeUp | FlyWay, state: VehicleState) -> None:
-    """Raises NotAllowedError unless the vehicle holds still where what it is to fly was certified to begin."""
-    if (refusal := why_not_from(request, state, time.monotonic())) is not None:
-        raise refusal
-
-
-class UnderWay:
-    """The mission of the flight that is under way: ``started`` changes only by the calls below."""
-
-    def __init__(self, onboard: OnBoard) -> None:
-        self._onboard, self.started = onboard, Started()
-        self._is_inherited = self._known_foreign = False
-        """Of a link node before this one, and not held against what is on board yet. The alarm has been raised."""
-
-    def begin(self, digest: str | None, begins: TakeUp | None = None) -> None:
-        self.started, self._is_inherited = Started(digest, begins), False
-
-    def inherit(self, started: Started) -> None:
-        self.started, self._is_inherited = started, True
-
-    def replaces(self) -> None:
-        """What is on board is replaced: it is not flown before it is taken up."""
-        digest = self.started.digest or self._onboard.digest or UNKNOWN_MISSION
-        self.started = Started(digest, self.started.begins, replaced_here=True)
-
-    def replaces_places(self) -> None:
-        """Fence or rally points are: the mission on board was not certified with those that come."""
-        self.started, self._is_inherited = Started(OTHER_PLACES, replaced_here=True), False
-
-    def moves_home(self) -> None:
-        """The mission on board was not certified for the home that comes."""
-        self.begin(OTHER_HOME)
-
-    def on_state(self, state: VehicleState) -> None:
-        if _flies_mission(state) and self.started.begins is not None:
-            self.started = replace(self.started, begins=None)
-        if self._onboard.mission is not None:
-            self._is_inherited = False
-
-    @property
-    def must_be_read(self) -> bool:
-        """A link node before this one knew what was on board, and this one does not yet."""
-        return self._is_inherited and self._onboard.mission is None and self.started.digest is not None
-
-    def check_goes_on(self, state: VehicleState) -> None:
-        """Raises MissionUnknownError, or NotAllowedError elsewhere than where it begins."""
-        if self.started.digest == OTHER_PLACES:
-            what = "The mission on board is not certified with the fence and rally points that were sent since."
-            raise NotAllowedError(what, advice="Take the plan up again, return home, or land.")
-        if self.started.digest == OTHER_HOME:
-            what = "The mission on board was certified for the home before: its heights count from the new one."
-            raise NotAllowedError(what, advice="Certify the rest from here (Fly, On board), return home, or land.")
-        if self.started.digest is not None:
-            check_same_mission(self._onboard, self.started.digest)
-        if self.started.begins is not None:
-            check_begins(self.started.begins, state)
-
-    @property
-    def why_foreign(self) -> str:
-        """What is said of a mission that ``turns_foreign``: whose it is, or why it does not hold any more."""
-        if self.started.digest == OTHER_HOME:
-            return HOME_MOVED
-        is_ours = self.started.replaced_here and not self._onboard.is_written_by_others
-        return NOT_TAKEN_UP if is_ours else FOREIGN_MISSION
-
-    def turns_foreign(self, state: VehicleState) -> bool:
-        """The vehicle flies by another mission than the one that was started: true once."""
-        digest = self.started.digest
-        if digest is None or self._is_inherited or self._onboard.digest == digest:
-            self._known_foreign = False
-            return False
-        is_first = _flies_mission(state) and not self._known_foreign
-        self._known_foreign = self._known_foreign or is_first
-        return is_first
-
-
-def _flies_mission(state: VehicleState) -> bool:
-    return state.armed and state.mode == MISSION_MODES.get(state.autopilot, "AUTO")
 
 
 async def first_item_next(vehicle: AdoptedVehicle) -> None:
@@ -339,6 +229,7 @@ class JoinMission:
             await vehicle.obey(orders.mode(GUIDED))
             if not vehicle.state.armed:
                 await vehicle.obey(orders.arm())
+            await _or_disarm(vehicle, see_home_here(vehicle))
             await vehicle.obey(orders.take_off(self._climb_to_m))
         except BaseException:
             self.is_active = False

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
-from telemetry.errors import NotAllowedError, TelemetryError
+from telemetry.errors import NotAllowedError, RefusedError, TelemetryError
 from telemetry.flight.guided.guided import GuidedScript
 from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_flight
 from telemetry.link.adopted import AdoptedVehicle
@@ -16,17 +17,14 @@ from telemetry.link.avoidance import Avoidance, remaining_after
 from telemetry.link.missions import (
     JoinMission,
     ReadMission,
-    UnderWay,
-    check_begins,
     check_holds,
     check_may_start,
-    check_same_mission,
     first_item_next,
     same_route,
     set_speeds,
     start_mission,
 )
-from telemetry.link.onboard import Started
+from telemetry.link.onboard import HOME_MOVED, Started, UnderWay, check_begins, check_same_mission
 from telemetry.link.procedures import Accepted, Procedures, ReadParameters, Spawn, change_mode, guided_way
 from telemetry.mavlink.autopilot_orders import HOLD_MODES, MISSION_MODES
 from telemetry.mavlink.believing import is_in_the_air
@@ -36,6 +34,7 @@ from telemetry.topics.requests import FlyManoeuvre, FlyWay, MayFlyManoeuvre, Set
 from telemetry.topics.vehicle import VehicleState
 
 RESTART_PARAMETER = "MIS_RESTART"
+NOT_BEGUN = ("idle", "arming", "interrupted")
 SUPERSEDED = "Another command was given."
 
 
@@ -213,7 +212,7 @@ class Pilot:
             finally:
                 script.stop(SUPERSEDED)
 
-        await self._procedures.take_over(fly, shows=lambda: begun is not None and begun.phase not in ("idle", "arming"))
+        await self._procedures.take_over(fly, shows=lambda: begun is not None and begun.phase not in NOT_BEGUN)
 
     async def set_speed(self, request: SetSpeed) -> None:
         most_m_s = self._most_m_s
@@ -254,10 +253,13 @@ class Pilot:
         await self._change_mode(*HOLD_MODES.get(state.autopilot, ("HOLD",)))
 
     async def resume(self) -> None:
+        self._under_way.check_home()
         if self.avoidance.is_engaged:
             self.avoidance.resume()
             return
         if self.script_flies and self.script is not None:
+            if self.script.ends_held:
+                raise NotAllowedError(self.script.ends_held, advice="Ask for another way, or return.")
             if self.script.is_flown:
                 raise NotAllowedError("The way is flown: nothing is paused.", advice="Ask for another one, or return.")
             self._tell_script(self.script.resume(time.monotonic()))
@@ -292,12 +294,32 @@ class Pilot:
         onboard = self.vehicle.onboard.mission
         self.flight.replaced(len(onboard.items) if onboard else 0, time.time())
 
-    def moves_home(self) -> None:
-        """Raises NotAllowedError unless it holds in the air. What is paused is not gone on with from another home."""
+    @contextlib.contextmanager
+    def moving_home(self) -> Iterator[None]:
+        """Around the order. What is paused is not gone on with from another home; where the vehicle refuses the order
+        it may go on. Raises NotAllowedError unless it holds in the air."""
         self.check_holds()
+        before, ordered = self._under_way.started, self._under_way.moves_home(perhaps=True)
+        try:
+            yield
+        except BaseException as error:
+            if isinstance(error, RefusedError):
+                self._under_way.stays_home(before, ordered)
+            else:
+                self._end_current()
+                self.join = None
+            raise
         self._end_current()
         self.join = None
         self._under_way.moves_home()
+
+    def home_was_moved(self) -> None:
+        """By somebody else, in flight: what is flown or paused counts its heights from there, and is held."""
+        self._under_way.moves_home()
+        if self.avoidance.is_engaged or (self.join is not None and self.join.is_active):
+            self._alarm(HOME_MOVED)
+            self._spawn(self._stop_foreign_mission(HOME_MOVED))
+        self.join = None
 
     async def return_home(self) -> None:
         await self._change_mode("RTL")

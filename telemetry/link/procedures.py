@@ -14,7 +14,7 @@ from typing import Any
 
 from planning.basics.plan_model import Firmware
 from telemetry.errors import NotAllowedError, SilentError, TelemetryError
-from telemetry.flight.guided.beginning import home_elsewhere
+from telemetry.flight.guided.beginning import HOME_SHOWS_S, home_elsewhere
 from telemetry.flight.guided.feed import Feed
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.mavlink.autopilot_orders import Order
@@ -26,8 +26,6 @@ Procedure = Callable[[Accepted], Coroutine[Any, Any, None]]
 Spawn = Callable[[Coroutine[Any, Any, None]], asyncio.Task[None]]
 ReadParameters = Callable[[tuple[str, ...]], Awaitable[dict[str, float | None]]]
 SHOWS_S = 3.0
-HOME_SHOWS_S = 4.0
-"""A vehicle that takes its home when it arms tells it at once, and again every two seconds."""
 TRIES = 3
 OPTIONS, STRAIGHT_LEGS = "GUID_OPTIONS", 64
 """ArduCopter then flies to the places of GUIDED as it does to waypoints."""

@@ -214,9 +214,14 @@ class Session:
         """Raises NotAllowedError, RefusedError, and SilentError where the vehicle does not tell that home."""
         vehicle, wanted = self.vehicle, HomePlace(request.lat_deg, request.lon_deg, request.alt_amsl_m)
         if is_in_the_air(vehicle.state):
-            self.pilot.moves_home()
-        else:
-            check_stands_there(vehicle.state, wanted, time.monotonic())
+            with self.pilot.moving_home():
+                await self._order_home(wanted)
+            return
+        check_stands_there(vehicle.state, wanted, time.monotonic())
+        await self._order_home(wanted)
+
+    async def _order_home(self, wanted: HomePlace) -> None:
+        vehicle = self.vehicle
         self._home.expect(wanted)
         try:
             await vehicle.obey(vehicle.orders.set_home(wanted.lat_deg, wanted.lon_deg, wanted.alt_amsl_m))
@@ -238,6 +243,8 @@ class Session:
         if (moved := self._home.on_state(state)) is not None:
             self._on_text(ALERT, moved)
             self._around.spawn(self._around.commands.record(AUTOPILOT, moved, must=False))
+            if self._home.is_elsewhere:
+                self.pilot.home_was_moved()
         self.pilot.avoidance.on_state(state)
 
     def _on_order(self, message: Message) -> None:

@@ -218,7 +218,8 @@ class StartGuided(OperatorRequest):
     """Takes off, hands over the targets one at a time, then returns home (Melita 2020) or holds there. -> None
 
     ``begins_lat_deg`` and ``begins_lon_deg``: where a certified take-off begins; it is refused where the vehicle stands
-    elsewhere. None: a check has looked at where it stands.
+    elsewhere. None: a check has looked at where it stands. ``spare_m``: of certified clearance beyond what is required,
+    by which home's height may change under it; None: not known.
     """
 
     targets: tuple[GuidedTarget, ...]
@@ -227,6 +228,7 @@ class StartGuided(OperatorRequest):
     end: Literal["rtl", "land", "hold"] = "rtl"
     begins_lat_deg: float | None = None
     begins_lon_deg: float | None = None
+    spare_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,7 +236,7 @@ class FlyWay(OperatorRequest):
     """Flies a certified way in GUIDED, from where the vehicle hovers; then it holds there or lands. -> None
 
     ``targets`` are no items of a mission: each is item 0. Refused when the vehicle moves, or is not where the way
-    begins. ``most_m_s``: for no higher speed is it certified.
+    begins. ``most_m_s``: for no higher speed is it certified. ``spare_m`` as for ``StartGuided``.
     """
 
     targets: tuple[GuidedTarget, ...]
@@ -244,6 +246,7 @@ class FlyWay(OperatorRequest):
     most_m_s: float
     waypoint_radius_m: float = 0.5
     end: Literal["land", "hold"] = "hold"
+    spare_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,7 +46,7 @@ class Craft:
         self.log.append((now_s, message))
         kind = message.get_type()
         if kind == "SET_POSITION_TARGET_GLOBAL_INT":
-            self._go(message.lat_int, message.lon_int, message.alt)
+            self._go(message.lat_int, message.lon_int, message.alt - HOME[2] * (message.coordinate_frame in (0, 5)))
             return []
         if kind == "COMMAND_INT":
             self._go(message.x, message.y, message.z - HOME[2])

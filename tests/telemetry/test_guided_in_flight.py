@@ -13,7 +13,7 @@ from telemetry.errors import NotAllowedError
 from telemetry.flight.guided.beginning import why_not_from
 from telemetry.flight.guided.feed import Feed
 from telemetry.flight.guided.guided import THERE, GuidedScript
-from telemetry.mavlink.actions import Action
+from telemetry.mavlink.actions import Action, Done, Send
 from telemetry.mavlink.autopilot_orders import FORCE, Orders
 from telemetry.mavlink.modes import mode_numbers
 from telemetry.topics.messages import GuidedTarget
@@ -207,3 +207,33 @@ def test_the_order_to_stop_the_motors_is_the_forced_disarming_of_both_autopilots
 def test_the_modes_that_it_flies_in_are_known() -> None:
     assert mode_numbers("ardupilot", "GUIDED") is not None
     assert GUIDED == 4
+
+
+def with_home(state: VehicleState, home_alt_amsl_m: float, **more: Any) -> VehicleState:
+    return replace(
+        state, home_lat_deg=HOME[0], home_lon_deg=HOME[1], home_alt_amsl_m=home_alt_amsl_m, mode="GUIDED", **more
+    )
+
+
+@pytest.mark.parametrize("told_first", ["home", "position"])
+def test_a_home_that_moves_leaves_the_vehicle_at_its_height_whatever_is_told_first(told_first: str) -> None:
+    script = GuidedScript(way(), in_air(), firmware="ardupilot", target=VEHICLE)
+    script.start(0.0)
+    before = with_home(in_air(), HOME[2])
+    taken = mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_DO_SET_MODE, 0)
+    taken.pack(mavlink.MAVLink(None, srcSystem=1, srcComponent=1))
+    script.on_message(taken, 0.1)
+    script.on_state(before, 0.1)
+    assert script.phase == "flying"
+    up_m = 10.0 if told_first == "home" else 22.0
+    sent = script.on_state(with_home(in_air(), HOME[2] - 12.0, alt_rel_home_m=up_m), 0.2)
+    assert [action.message.coordinate_frame for action in sent if isinstance(action, Send)] == [5]
+    assert [action.message.alt for action in sent if isinstance(action, Send)] == [pytest.approx(HOME[2] + 10.0)]
+    assert (script.phase, script.is_over) == ("paused", False), "the order may be lost"
+    assert script.resume(0.3) == []
+    now = with_home(in_air(), HOME[2] - 12.0, alt_rel_home_m=22.0, position_t_mono_s=2.0, ground_speed_m_s=4.0)
+    again = script.on_state(replace(now, lat_deg=HOME[0] + 1e-4), 2.0)
+    assert [action.message.alt for action in again if isinstance(action, Send)] == [pytest.approx(HOME[2] + 10.0)]
+    ended = script.on_state(replace(now, position_t_mono_s=4.0, ground_speed_m_s=0.1), 4.0)
+    assert [type(action) for action in ended] == [Done]
+    assert "certified for the home before" in script.hint

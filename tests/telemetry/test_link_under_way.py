@@ -11,8 +11,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import MissionUnknownError, NotAllowedError
-from telemetry.link.missions import FOREIGN_MISSION, NOT_TAKEN_UP, UnderWay
-from telemetry.link.onboard import OnBoard, Started
+from telemetry.link.onboard import FOREIGN_MISSION, HOME_MOVED, NOT_TAKEN_UP, OnBoard, Started, UnderWay
 from telemetry.nodes.link import Memory, read_memory, write_memory
 from telemetry.topics.messages import FlightStatus
 from telemetry.topics.onboard_lists import OnboardMission
@@ -159,3 +158,30 @@ def test_the_end_of_the_flight_ends_it() -> None:
             assert it.pilot.started == Started()
 
     run(whole)
+
+
+def test_a_home_that_the_vehicle_refused_leaves_what_is_paused_as_it_was() -> None:
+    flight = taken_up()
+    before, ordered = flight.started, flight.moves_home(perhaps=True)
+    with pytest.raises(NotAllowedError, match="may have been moved"):
+        flight.check_goes_on(holding())
+    flight.stays_home(before, ordered)
+    flight.check_goes_on(holding())
+
+
+def test_a_refusal_does_not_take_back_what_somebody_else_moved_meanwhile() -> None:
+    flight = taken_up()
+    before, ordered = flight.started, flight.moves_home(perhaps=True)
+    flight.moves_home()
+    flight.stays_home(before, ordered)
+    with pytest.raises(NotAllowedError, match="certified for the home before"):
+        flight.check_goes_on(holding())
+
+
+def test_a_mission_that_flies_on_from_another_home_is_told_why_it_is_held() -> None:
+    flight = taken_up()
+    flight.moves_home()
+    assert flight.turns_foreign(holding(mode="AUTO"))
+    assert flight.why_foreign == HOME_MOVED
+    flight.moves_home(perhaps=True)
+    assert "may have been moved" in flight.why_foreign

@@ -18,6 +18,10 @@ BEGINS_M, STANDS_M_S = 1.0, 1.0
 OFF_THE_GROUND_M = 0.5
 HOME_BESIDE_M, HOME_UP_M = 3.0, 2.0
 """What a standing receiver and barometer wander, as between the check and the start."""
+HOME_FAR_M, HOME_LEVEL_M = 6.0, 0.3
+"""However inaccurate the receiver is; and by how much a standing vehicle's height above home may be none."""
+HOME_SHOWS_S = 4.0
+"""A vehicle that takes its home when it arms tells it at once, and again every two seconds."""
 
 
 def why_moves(state: VehicleState) -> NotAllowedError | None:
@@ -68,10 +72,16 @@ def home_elsewhere(state: VehicleState) -> NotAllowedError | None:
         return None
     home, at = (state.home_lat_deg or 0.0, state.home_lon_deg or 0.0), (state.lat_deg or 0.0, state.lon_deg or 0.0)
     away_m = apart_m(home, at)
-    if away_m <= HOME_BESIDE_M + 2 * (state.horizontal_accuracy_m or 0.0):
-        return None
-    what = f"Home lies {away_m:.0f} m from where the vehicle stands: an order has fixed it there."
-    return NotAllowedError(what, advice="Set home here (Fly, Home), or restart the vehicle; then check again.")
+    advice = "Set home here (Fly, Home), or restart the vehicle; then check again."
+    if not away_m <= min(HOME_FAR_M, HOME_BESIDE_M + 2 * (state.horizontal_accuracy_m or 0.0)):
+        what = f"Home lies {away_m:.0f} m from where the vehicle stands: an order has fixed it there."
+        return NotAllowedError(what, advice=advice)
+    up_m = state.alt_rel_home_m or 0.0
+    if not abs(up_m) <= HOME_LEVEL_M:
+        side = "above" if up_m > 0 else "below"
+        what = f"The vehicle stands {abs(up_m):.1f} m {side} home by its own word: every height would be off by that."
+        return NotAllowedError(what, advice=advice)
+    return None
 
 
 def is_off_the_ground(state: VehicleState) -> bool:

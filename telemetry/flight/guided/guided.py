@@ -14,7 +14,7 @@ from typing import Literal
 
 from planning.basics.plan_model import Firmware
 from telemetry.errors import NotAllowedError, SilentError, TelemetryError
-from telemetry.flight.guided.beginning import is_off_the_ground, why_not_from
+from telemetry.flight.guided.beginning import HOME_SHOWS_S, home_elsewhere, is_off_the_ground, why_not_from
 from telemetry.flight.guided.feed import Feed
 from telemetry.flight.guided.handover import Handover, away_m, is_fresh
 from telemetry.flight.guided.leading import Leading
@@ -60,7 +60,7 @@ class GuidedScript:
         self._came_from: Place | None = None
         """The place that was reached last; nowhere after a take-off or a pause."""
         self._request, self._endpoints, self._orders = request, Endpoints(target, own), GuidedOrders(firmware, target)
-        self._watch, self._home_watched, self._punctuality = ModeWatch(), HomeWatched(), Punctuality()
+        self._watch, self._home_watched, self._punctuality = ModeWatch(), HomeWatched(request.spare_m), Punctuality()
         self._targets = request.targets
         self._takeoff_m = request.takeoff_alt_rel_home_m if isinstance(request, StartGuided) else -math.inf
         self.phase: FlightPhase = "idle"
@@ -75,6 +75,10 @@ class GuidedScript:
         self._reached_s: float | None = None
         self._return_at_s = 0.0
         self._standstill, self._stands = Standstill(), ""
+        self._home_shows_by_s: float | None = None
+        """Until then it is armed and waits for its home."""
+        self.ends_held = ""
+        """Why it ends once the vehicle holds where it was; empty: it does not."""
 
     @property
     def is_over(self) -> bool:
@@ -172,13 +176,13 @@ class GuidedScript:
             self.phase, self.hint, self._came_from = "paused", "", None
             if self._leading is not None:
                 self._leading.stop()
-            return self._go_to(self._here(), now_s, holds=True)
+            return self._stay_here(now_s)
         if self.phase == "taking_off":
             self.phase, self.hint = "paused", "It climbs to the height of the take-off first."
         return []
 
     def resume(self, now_s: float) -> list[Action]:
-        if self.phase != "paused" or self.is_flown:
+        if self.phase != "paused" or self.is_flown or self.ends_held:
             return []
         self.hint = ""
         if self._handover is None:
@@ -206,8 +210,15 @@ class GuidedScript:
         if self.phase != "arming" and (words := self._watch.interruption(state)):
             landed = self.phase == "returning" and not state.armed
             return self._land() if landed else self._interrupt(words)
+        if self.ends_held:
+            return self._end_held(state, now_s)
         if self.phase in ("flying", "paused") and (words := self._home_watched.interruption(state)):
-            return [*self._go_to(self._here(), now_s, holds=True), *self._interrupt(words)]
+            if self._leading is not None:
+                self._leading.stop()
+            self.phase, self.hint, self.ends_held = "paused", words, words
+            return self._stay_here(now_s)
+        if self._home_shows_by_s is not None:
+            return self._see_home(now_s)
         step = {"taking_off": self._climb, "flying": self._fly, "paused": self._hold, "returning": self._return}
         return step[self.phase](state, now_s) if self.phase in step else []
 
@@ -246,6 +257,17 @@ class GuidedScript:
         self.phase, self._handover = "returning", None
         return [progress, *self._go_home(now_s)]
 
+    def _end_held(self, state: VehicleState, now_s: float) -> list[Action]:
+        """Orders may be lost: it is over only once the vehicle has taken that it is to stay."""
+        assert self._handover is not None
+        held = self._handover.is_held(state, now_s)
+        return self._interrupt(self.ends_held) if held else self._again_if_needed(state, now_s)
+
+    def _stay_here(self, now_s: float) -> list[Action]:
+        """Where the vehicle is by its last position, whose height above the sea no home moves."""
+        self._handover = Handover(self._here(), radius_m=self._request.waypoint_radius_m, holds=True, stays=True)
+        return self._send_place(now_s)
+
     def _stay_there(self, now_s: float) -> list[Action]:
         """Until another command comes: the script goes on watching that it does."""
         assert self._handover is not None
@@ -264,7 +286,7 @@ class GuidedScript:
     def _hold(self, state: VehicleState, now_s: float) -> list[Action]:
         if self._handover is not None:
             return self._again_if_needed(state, now_s)
-        return self._go_to(self._here(), now_s, holds=True) if self._is_up(state, now_s) else []
+        return self._stay_here(now_s) if self._is_up(state, now_s) else []
 
     def _return(self, state: VehicleState, now_s: float) -> list[Action]:
         if not state.armed or (state.landed == "on_ground" and self._watch.seen):
@@ -291,7 +313,18 @@ class GuidedScript:
 
     def _arm(self, now_s: float) -> list[Action]:
         message = self._orders.arm()
-        return self._pending.begin(message, now_s, once=True, confirm=lambda state: state.armed, then=self._take_off)
+        return self._pending.begin(message, now_s, once=True, confirm=lambda state: state.armed, then=self._see_home)
+
+    def _see_home(self, now_s: float) -> list[Action]:
+        """It has armed: home comes to where it stands, or an order has fixed it elsewhere."""
+        self._home_shows_by_s = now_s + HOME_SHOWS_S if self._home_shows_by_s is None else self._home_shows_by_s
+        refusal = home_elsewhere(self._state)
+        if refusal is None:
+            self._home_shows_by_s = None
+            return self._take_off(now_s)
+        if now_s < self._home_shows_by_s:
+            return []
+        return [Send(self._orders.disarm()), *self._fail(refusal)]
 
     def _take_off(self, now_s: float) -> list[Action]:
         self.phase = "taking_off"
@@ -343,7 +376,7 @@ class GuidedScript:
     def _send_place(self, now_s: float) -> list[Action]:
         assert self._handover is not None
         self._handover.sent(self._state, now_s)
-        return [Send(self._orders.go_to(self._handover.place))]
+        return [Send(self._orders.go_to(self._handover.place, from_sea=self._handover.stays))]
 
     def _again_if_needed(self, state: VehicleState, now_s: float) -> list[Action]:
         assert self._handover is not None

@@ -37,10 +37,11 @@ def is_fresh(state: VehicleState, now_s: float) -> bool:
 
 
 class Handover:
-    def __init__(self, place: Place, *, radius_m: float, holds: bool = False) -> None:
-        """``holds``: the vehicle is to stay there; moving on is no sign that it has taken the place."""
+    def __init__(self, place: Place, *, radius_m: float, holds: bool = False, stays: bool = False) -> None:
+        """``holds``: the vehicle is to stay there; moving on is no sign that it has taken the place. ``stays``: at its
+        height above the sea, wherever home goes: it is where the vehicle was."""
         self.place = place
-        self._holds = holds
+        self._holds, self._stays = holds, stays
         self.sendings = 0
         self._radius_m = radius_m
         self._taken: bool | None = None
@@ -48,8 +49,13 @@ class Handover:
         self._away_when_sent_m = math.inf
 
     def follow_home(self, home_alt_amsl_m: float) -> bool:
-        """Heights count from where home is now. True: it has moved, and the place with it."""
-        if not abs(home_alt_amsl_m - self.place.home_alt_amsl_m) > HOME_MOVED_M:
+        """Heights count from where home is now. True: it has moved, and the place with it: not one that is held."""
+        shift_m = home_alt_amsl_m - self.place.home_alt_amsl_m
+        if not abs(shift_m) > HOME_MOVED_M:
+            return False
+        if self._stays:
+            up_m = self.place.alt_rel_home_m - shift_m
+            self.place = replace(self.place, alt_rel_home_m=up_m, home_alt_amsl_m=home_alt_amsl_m)
             return False
         self.place = replace(self.place, home_alt_amsl_m=home_alt_amsl_m)
         self._taken = None
@@ -86,6 +92,17 @@ class Handover:
             return left_m <= max(self._radius_m, HELD_M)
         moving = (state.ground_speed_m_s or 0.0) > MOVING_M_S or abs(state.climb_m_s or 0.0) > MOVING_M_S
         return moving or left_m <= self._radius_m or left_m < self._away_when_sent_m - NEARER_M
+
+    def is_held(self, state: VehicleState, now_s: float) -> bool:
+        """The vehicle has taken the place, or stands there since."""
+        if self._taken or not is_fresh(state, now_s):
+            return bool(self._taken)
+        stands = math.hypot(state.ground_speed_m_s or 0.0, state.climb_m_s or 0.0) <= MOVING_M_S
+        return now_s - self._sent_s >= HOLD_AGAIN_S and stands and self._seems_to_go(state)
+
+    @property
+    def stays(self) -> bool:
+        return self._stays
 
     def has_arrived(self, state: VehicleState, now_s: float) -> bool:
         return is_fresh(state, now_s) and away_m(state, self.place) <= self._radius_m

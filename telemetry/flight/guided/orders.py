@@ -76,6 +76,9 @@ class GuidedOrders:
     def arm(self) -> Message:
         return self._long(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
 
+    def disarm(self) -> Message:
+        return self._long(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0)
+
     def take_off(self, alt_rel_home_m: float, home_alt_amsl_m: float) -> Message:
         if self.firmware == "ardupilot":
             return self._long(mavlink.MAV_CMD_NAV_TAKEOFF, last=alt_rel_home_m)
@@ -86,27 +89,31 @@ class GuidedOrders:
         """``kind``: SPEED_TYPE."""
         return self._long(mavlink.MAV_CMD_DO_CHANGE_SPEED, kind, speed_m_s, ANY_THROTTLE)
 
-    def go_to(self, place: Place, *, changes_mode: bool = True) -> Message:
-        """``changes_mode``: of PX4 in another mode, which else takes no notice."""
+    def go_to(self, place: Place, *, changes_mode: bool = True, from_sea: bool = False) -> Message:
+        """``changes_mode``: of PX4 in another mode, which else takes no notice. ``from_sea``: ArduPilot too is told the
+        height above the sea, which does not move with home."""
         if self.firmware == "px4":
             return self._reposition(place, float(changes_mode))
-        return self._position_target(place, IGNORE_ALL_BUT_PLACE, (0.0, 0.0, 0.0))
+        return self._position_target(place, IGNORE_ALL_BUT_PLACE, (0.0, 0.0, 0.0), from_sea=from_sea)
 
     def follow(self, place: Place, v_neu_m_s: tuple[float, float, float]) -> Message:
         """ArduPilot's: the place moves on at this velocity until the next one is sent."""
         return self._position_target(place, VELOCITY_IS_GIVEN, v_neu_m_s)
 
-    def _position_target(self, place: Place, mask: int, v_neu_m_s: tuple[float, float, float]) -> Message:
-        yaw_rad, frame = place.heading_rad, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+    def _position_target(
+        self, place: Place, mask: int, v_neu_m_s: tuple[float, float, float], *, from_sea: bool = False
+    ) -> Message:
+        yaw_rad = place.heading_rad
+        above_home = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
         return mavlink.MAVLink_set_position_target_global_int_message(
             time_boot_ms=0,
             target_system=self.target[0],
             target_component=self.target[1],
-            coordinate_frame=frame,
+            coordinate_frame=mavlink.MAV_FRAME_GLOBAL_INT if from_sea else above_home,
             type_mask=mask if yaw_rad is None else mask & YAW_IS_GIVEN,
             lat_int=round(place.lat_deg * 1e7),
             lon_int=round(place.lon_deg * 1e7),
-            alt=place.alt_rel_home_m,
+            alt=place.alt_rel_home_m + (place.home_alt_amsl_m if from_sea else 0.0),
             vx=v_neu_m_s[0],
             vy=v_neu_m_s[1],
             vz=-v_neu_m_s[2],

@@ -28,8 +28,10 @@ ON_THE_GROUND_ONLY = {
     wire.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN,
     wire.MAV_CMD_DO_FENCE_ENABLE,
     wire.MAV_CMD_DO_MOTOR_TEST,
+    wire.MAV_CMD_DO_SET_HOME,
 }
-"""Not simulated; while the motors turn they are denied: measured."""
+"""While the motors turn they are denied: measured of PX4 1.17, whose source reads otherwise of DO_SET_HOME. The others
+are not simulated."""
 RESULTS: dict[Verdict, int] = {"accepted": 0, "rejected": 1, "denied": 2, "unsupported": 3, "failed": 4}
 
 
@@ -126,7 +128,7 @@ class Px4Commands:
         return verdict
 
     def _set_home(self, order: ReceivedOrder) -> Verdict:
-        """As Commander.cpp has it, armed or not. Heights are above mean sea level, whatever frame is named."""
+        """As Commander.cpp has it, with the motors off. Heights are above mean sea level, whatever frame is named."""
         if order.params[0] > 0.5:
             return self._pilot.set_home(None)
         place = (order.lat_deg, order.lon_deg, order.alt_m)
