@@ -78,7 +78,7 @@ def predict_duration(
     takeoff_s += _rest_to_rest(flight.points_m[0] - flight.takeoff_m, axes) + float(flight.hold_s[0])
     last = flight.transit_from
     pace = planned_pace(profile) if returns is None else worse_pace(returns, profile)
-    return_s = float(reached_s[-1] - reached_s[last]) + _way_home(flight, profile, axes, pace)
+    return_s = float(reached_s[-1] - reached_s[last]) + _way_home(flight, axes, pace)
     flight_s = float(reached_s[last])
     return PredictedTime(
         total_s=takeoff_s + flight_s + return_s,
@@ -171,14 +171,14 @@ def _rest_to_rest(delta_m: F64, axes: Axes) -> float:
     return leg(delta_m, axes).duration_s if np.linalg.norm(delta_m) > 1e-6 else 0.0
 
 
-def _way_home(flight: _Flight, profile: VehicleProfile, axes: Axes, pace: ReturnPace) -> float:
+def _way_home(flight: _Flight, axes: Axes, pace: ReturnPace) -> float:
     """Climb to the return height, straight home, a wait, down, and slowly for the last metres."""
     x, y, alt_m = flight.points_m[-1].tolist()
     if not flight.lands_by_rtl:
         return _rest_to_rest(np.array([x, y, 0.0]), axes) + _descent(alt_m, pace)
     axes = replace(axes, speed_m_s=pace.level_m_s, climb_m_s=pace.climb_m_s)
     # A vehicle above its return height keeps its own.
-    return_m = max(alt_m, profile.rtl_height_m)
+    return_m = max(alt_m, pace.height_m)
     climb_s = _rest_to_rest(np.array([0.0, 0.0, return_m - alt_m]), axes)
     return climb_s + _rest_to_rest(np.array([x, y, 0.0]), axes) + pace.wait_s + _descent(return_m, pace)
 

@@ -146,7 +146,8 @@ class Health:
         if home_s is None:
             return HealthRow("battery", _by_share(share, profile), value, over)
         still = " in still air, for the wind is not known" if state.wind_speed_m_s is None else ""
-        limit = f"way home {_minutes(math.ceil(home_s - ROUNDED_S))}{still}"
+        hovers = "" if returns.lands else "; over home it hovers until it is landed"
+        limit = f"way home {_minutes(math.ceil(home_s - ROUNDED_S))}{still}{hovers}"
         if left_s <= home_s:
             return HealthRow("battery", "bad", value, limit, "The way home needs the reserve. Return now.")
         if left_s <= home_s + NEAR_HOME_S:
@@ -178,7 +179,7 @@ def way_home_s(state: VehicleState, profile: VehicleProfile, returns: ReturnSpee
     pace = worse_pace(returns, profile)
     # Autopilots hold their speed over ground as long as the wind lets them.
     against_m_s = max(SLOWEST_HOME_M_S, profile.max_speed_m_s - (state.wind_speed_m_s or 0.0))
-    top_m = max(height_m, profile.rtl_height_m)
+    top_m = max(height_m, pace.height_m)
     down_s = max(0.0, top_m - pace.slow_below_m) / pace.descent_m_s + min(top_m, pace.slow_below_m) / pace.land_m_s
     return away_m / min(pace.level_m_s, against_m_s) + (top_m - height_m) / pace.climb_m_s + pace.wait_s + down_s
 

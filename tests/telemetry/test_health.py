@@ -143,6 +143,14 @@ def test_the_way_home_is_flown_at_the_vehicles_own_speeds_and_at_the_worse_end_w
     assert way_home_s(state(), slower) == pytest.approx(5 + 200 / 4 + 45, rel=1e-3)
 
 
+def test_the_way_home_leads_over_the_vehicles_own_return_height_and_what_does_not_land_is_said() -> None:
+    higher = ReturnSpeeds(height_m=100.0, lands=False)
+    assert way_home_s(state(), PROFILE, higher) == pytest.approx(80 / 2 + 200 / 8 + 5 + 90 / 1 + 10 / 0.5, rel=1e-3)
+    assert way_home_s(state(), PROFILE, ReturnSpeeds(height_m=5.0)) == way_home_s(state(), PROFILE)
+    told = next(each for each in Health().rows(state(), PROFILE, returns=higher) if each.code == "battery")
+    assert "hovers until it is landed" in told.limit
+
+
 def test_a_battery_that_goes_down_faster_than_set_counts_as_it_goes_down() -> None:
     health = Health()
     for second in range(0, 121, 10):

@@ -56,8 +56,28 @@ def test_no_return_speed_of_its_own_is_the_cruising_speed_and_a_landing_may_be_f
 
 def test_px4_returns_at_its_cruising_speed_and_lands_slowly_from_where_it_begins_to() -> None:
     assert return_speeds(PX4, "px4") == ReturnSpeeds(5.0, 3.0, 1.5, 0.7, 10.0, 0.0)
-    assert return_speeds(PX4 | {"RTL_LAND_DELAY": -1.0}, "px4").wait_s == 0.0
+    waits = return_speeds(PX4 | {"RTL_LAND_DELAY": -1.0}, "px4")
+    assert (waits.wait_s, waits.lands) == (0.0, False)
     assert set(PX4) <= set(NAMES["px4"])
+
+
+def test_a_return_is_as_high_as_it_is_set_and_ends_in_the_air_where_that_is_set() -> None:
+    assert return_speeds(OLD | {"RTL_ALT": 10000.0}, "ardupilot").height_m == 100.0
+    assert return_speeds({"RTL_ALT_M": 40.0, "RTL_ALT_FINAL_M": 5.0}, "ardupilot") == ReturnSpeeds(
+        height_m=40.0, lands=False
+    )
+    assert return_speeds(PX4 | {"RTL_RETURN_ALT": 60.0}, "px4").height_m == 60.0
+    assert not return_speeds(OLD | {"RTL_ALT_FINAL": 200.0}, "ardupilot").lands
+
+
+def test_the_higher_of_both_return_heights_is_climbed_to() -> None:
+    profile = VehicleProfile("any", mean_speed_m_s=3.0, max_speed_m_s=5.0)
+    mission, low = waypoints([(0, 0, 10), (300, 0, 10)]), replace(KNOWN, height_m=1.0)
+    seconds = [predict_duration(mission, PROFILE, LEVEL, returns=own).return_s for own in (KNOWN, low)]
+    assert seconds[0] == seconds[1]
+    high = predict_duration(mission, PROFILE, LEVEL, returns=replace(KNOWN, height_m=PROFILE.rtl_height_m + 60.0))
+    assert high.return_s - seconds[0] == pytest.approx(60 / min(2.5, PROFILE.max_climb_m_s) + 60 / 1.5, rel=0.05)
+    assert worse_pace(ReturnSpeeds(), profile).height_m == profile.rtl_height_m
 
 
 def test_what_was_not_read_or_is_no_number_is_not_known() -> None:

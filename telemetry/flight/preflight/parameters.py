@@ -20,6 +20,7 @@ NAMES: dict[Firmware, tuple[str, ...]] = {
         *("RTL_SPEED", "RTL_SPEED_MS", "WPNAV_SPEED", "WP_SPD", "PSC_JERK_XY", "PSC_JERK_NE"),
         *("WPNAV_SPEED_UP", "WP_SPD_UP", "WPNAV_SPEED_DN", "WP_SPD_DN", "RTL_LOIT_TIME"),
         *("LAND_SPEED", "LAND_SPD_MS", "LAND_SPEED_HIGH", "LAND_SPD_HIGH_MS", "LAND_ALT_LOW", "LAND_ALT_LOW_M"),
+        *("RTL_ALT_FINAL", "RTL_ALT_FINAL_M"),
         *("FENCE_ENABLE", "FENCE_TYPE", "FENCE_ACTION", "FENCE_ALT_MAX"),
     ),
     "px4": (
@@ -99,7 +100,9 @@ def flown_speeds(parameters: Mapping[str, float | None], onboard: OnboardMission
 
 
 def return_speeds(parameters: Mapping[str, float | None], firmware: Firmware) -> ReturnSpeeds:
-    """As the vehicle is set. PX4's delay before it lands counts where it is one: below 0 it never lands by itself."""
+    """As the vehicle is set. PX4's delay before it lands counts where it is one: below 0 it never lands by itself,
+    nor does ArduPilot with a final height."""
+    height_m = return_settings(parameters, firmware).height_m
     if firmware == "px4":
         cruise_m_s, up_m_s, down_m_s, land_m_s, low_m, wait_s = (
             _first(parameters, (name,))[1]
@@ -108,8 +111,8 @@ def return_speeds(parameters: Mapping[str, float | None], firmware: Firmware) ->
                 *("MPC_LAND_SPEED", "MPC_LAND_ALT1", "RTL_LAND_DELAY"),
             )
         )
-        wait_s = None if wait_s is None else max(0.0, wait_s)
-        return ReturnSpeeds(cruise_m_s, up_m_s, down_m_s, land_m_s, low_m, wait_s)
+        lands, wait_s = (wait_s or 0.0) >= 0.0, None if wait_s is None else max(0.0, wait_s)
+        return ReturnSpeeds(cruise_m_s, up_m_s, down_m_s, land_m_s, low_m, wait_s, height_m, lands)
     level_m_s, up_m_s, down_m_s, land_m_s, fast_m_s, low_m, wait_ms = (
         _first(parameters, names)[1] for names in (HOME, UP, DOWN, LAND, LAND_FAST, LAND_LOW, ("RTL_LOIT_TIME",))
     )
@@ -120,6 +123,8 @@ def return_speeds(parameters: Mapping[str, float | None], firmware: Firmware) ->
         land_m_s,
         low_m,
         None if wait_ms is None else wait_ms / 1000,
+        height_m,
+        (_first(parameters, ("RTL_ALT_FINAL_M", "RTL_ALT_FINAL"))[1] or 0.0) <= 0.0,
     )
 
 
