@@ -107,11 +107,13 @@ class Checklists:
         return [(profile, change) for profile, kept in self._lists.items() for change in kept.unlogged]
 
     def logged(self, profile: str, change: Change) -> None:
-        """The log of commands knows of it. Blocks. Raises StorageError."""
+        """The log of commands knows of it, also where that cannot be kept: then it stands there again after the next
+        start of the server. Blocks. Raises StorageError."""
         with self._change:
             kept = self._lists[profile]
             left = tuple(each for each in kept.unlogged if each != change)
-            self._keep(self._lists | {profile: replace(kept, unlogged=left)})
+            self._lists = self._lists | {profile: replace(kept, unlogged=left)}
+            self._keep(self._lists)
 
     def _keep(self, lists: dict[str, KeptChecklist]) -> None:
         write_atomically(self._file, msgspec.json.format(msgspec.json.encode(lists)))

@@ -308,6 +308,22 @@ def test_a_text_that_is_changed_and_never_ticked_is_in_the_log_once_the_link_is_
     assert len(again.changes) == 2, "each once"
 
 
+def test_a_change_that_cannot_be_kept_as_logged_is_logged_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    desk = Desk(tmp_path)
+    desk.write(LIST)
+
+    def is_full(file: Path, data: bytes) -> None:
+        raise StorageError("No space is left.")
+
+    with monkeypatch.context() as full:
+        full.setattr("server.flying.checklists.write_atomically", is_full)
+        with pytest.raises(StorageError, match="No space"):
+            asyncio.run(desk.desk.log_changes(BEN))
+        for _ in range(3):
+            asyncio.run(desk.desk.log_changes(BEN))
+    assert len(desk.changes) == 1
+
+
 def test_so_many_changes_without_a_log_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("server.flying.checklists.MOST_UNLOGGED", 2)
     desk = Desk(tmp_path)
