@@ -48,7 +48,15 @@ from server.work.jobs import Lane
 from server.workspace import Workspace
 from telemetry.bus.bus import Bus
 from telemetry.bus.link_client import LinkClient
-from telemetry.topics.messages import FlightStatus, LinkStatus, RecorderStatus, ServerAlive, Topic, VehicleText
+from telemetry.topics.messages import (
+    FlightStatus,
+    LinkStatus,
+    RecorderStatus,
+    ServerAlive,
+    Topic,
+    TransferStatus,
+    VehicleText,
+)
 from telemetry.topics.obstacles import AvoidanceStatus
 from telemetry.topics.vehicle import RadarKind, VehicleState
 
@@ -152,9 +160,9 @@ class Flying:
             link, work, aboard, checklist, workspace, self.live, self._watch, bus, present, taking_up, is_alone=alone
         )
         self.ways = WayDesk(link, self.live, workspace, library, lane, self._watch, present)
-        self.home = HomeDesk(link, self.live, self.ways, lane, present, lease.server_operator)
+        self.home = HomeDesk(link, self.live, self.ways, lane, present, lease.server_operator, self.desk.on_home_set)
         name = "" if alone else wanted.name
-        self.parameters = ParameterDesk(link, self.live, aboard, library.root, self.desk.on_parameters, name)
+        self.parameters = ParameterDesk(link, self.live, aboard, library.root, self._on_parameters, name)
         self.recording = Recording(number, recordings, shared.shelf, self.nodes, present)
         self.logs = VehicleLogs(link, self.live, library, name)
         self.simulation = Simulation(
@@ -263,16 +271,25 @@ class Flying:
     # What is heard
 
     def _relay(self) -> Relay:
-        relay, present = Relay(self.bus), self._present
+        relay = Relay(self.bus)
         relay.on(Topic.VEHICLE, self._on_state)
         relay.on(Topic.TEXT, self._on_text, each=True)
         relay.on(Topic.LINK, self._on_link)
-        relay.on(Topic.TRANSFER, lambda transfer: present.publish(TransferMessage(transfer=transfer)))
+        relay.on(Topic.TRANSFER, self._on_transfer)
         relay.on(Topic.FLIGHT, self._on_flight)
         relay.on(Topic.AVOIDANCE, self._on_avoidance)
         relay.on(Topic.RECORDER, self._on_recorder)
         self._obstacles.hear(relay)
         return relay
+
+    def _on_parameters(self) -> None:
+        self.desk.on_parameters()
+        self.home.on_changed()
+
+    def _on_transfer(self, transfer: TransferStatus) -> None:
+        self._present.publish(TransferMessage(transfer=transfer))
+        if transfer.direction == "upload" and transfer.phase in ("done", "failed"):
+            self.home.on_changed()
 
     def _on_state(self, state: VehicleState) -> None:
         was_armed = self.live.armed
@@ -297,6 +314,7 @@ class Flying:
             self._shared.on_vehicle()
         self.desk.on_link(status)
         self.ways.on_link(self._aboard.vehicle)
+        self.home.on_link(self._aboard.vehicle)
         self._followed.look()
         await self.connections.on_status(status)
         await self.simulation.on_link(status)

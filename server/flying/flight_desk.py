@@ -135,6 +135,11 @@ class FlightDesk:
         self._checklist.forget("The vehicle was disarmed: each flight is ticked for itself.")
         self.refresh()
 
+    def on_home_set(self) -> None:
+        """By order, or perhaps: what was checked before a start was checked for the home before."""
+        self._ready = None
+        self.refresh()
+
     def on_parameters(self) -> None:
         """Some were written, or may have been: what was checked before may not hold any more."""
         self._ready, self._at_fence, self._live.returns = None, "", ReturnSpeeds()

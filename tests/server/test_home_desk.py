@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from mapping.geometry.frames import moved_deg
-from server.errors import CheckNeededError, NotFoundError
+from server.errors import CheckNeededError, ConflictError, NotFoundError
 from server.flying.in_flight.home_desk import HomeDesk
 from server.flying.in_flight.way_desk import WayDesk
 from server.heard.channel import Channel
@@ -68,7 +68,11 @@ class Bench:
         self.live.track.states = [stands, self.live.state]
         self.mirrors: dict[str, Any] = {name: SimpleNamespace(origin=None) for name in SENSORS}
         ways = WayDesk(me.vehicle, self.live, me, made.library, lane, me, Told())
-        self.desk = HomeDesk(me.vehicle, self.live, ways, lane, me, lambda: ME)
+        self.sets = 0
+        self.desk = HomeDesk(me.vehicle, self.live, ways, lane, me, lambda: ME, self.home_set)
+
+    def home_set(self) -> None:
+        self.sets += 1
 
     def publish(self, message: Any) -> None:
         self.told.append(message.home)
@@ -152,8 +156,14 @@ def test_home_is_not_where_the_model_knows_no_ground_nor_on_a_height_that_nobody
         with pytest.raises(NotAllowedError, match="Home cannot be there: the surface model ends"):
             await bench.desk.judge(ME, HomeBody.model_validate({"place": {"lat_deg": 37.0, "lon_deg": 14.0}}))
         assert not bench.desk.state.is_judging
+        right = await bench.asked(20.0)
         bench.moves(0.0, up_m=-8.0)
-        with pytest.raises(NotAllowedError, match=r"8\.0 m below the ground"):
+        again = await bench.asked(20.0)
+        assert again.alt_amsl_m == pytest.approx(right.alt_amsl_m), "it lies on the ground again"
+        assert again.rises_m == pytest.approx(right.rises_m + 8.0)
+        bench.live.track.states = [bench.state]
+        bench.live.state = replace(bench.state, gnss_fix="3d")
+        with pytest.raises(NotAllowedError, match="Home of the take-off was not heard"):
             await bench.asked(20.0)
         stands = Bench(made, lane, up_m=0.0)
         stands.live.state = replace(stands.state, gnss_alt_amsl_m=(stands.state.alt_amsl_m or 0.0) - 6.0,
@@ -188,6 +198,80 @@ def test_a_home_that_moved_has_its_return_judged_without_anybody_asking(
             bench.live.state = replace(bench.state, armed=False, landed="on_ground")
             bench.desk.on_state(bench.state)
             assert bench.desk.state.ret is None
+        finally:
+            judging.cancel()
+
+    runner.run(scenario())
+
+
+def test_a_home_that_was_judged_is_not_set_once_home_or_vehicle_is_another(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        bench.desk.on_link("one")
+        doc = await bench.asked(20.0)
+        bench.moves(5.0)
+        with pytest.raises(CheckNeededError, match="Home was moved"):
+            await bench.desk.set(ME, SetHomeBody(id=doc.id))
+        here = await bench.asked()
+        there = made.standing(east_m=4.0)
+        bench.live.state = replace(bench.state, lat_deg=there.lat_deg, lon_deg=there.lon_deg)
+        with pytest.raises(CheckNeededError, match="The vehicle has moved"):
+            await bench.desk.set(ME, SetHomeBody(id=here.id))
+        another = asyncio.ensure_future(bench.asked(20.0))
+        await shows(lambda: bench.desk.state.is_judging)
+        bench.desk.on_link("other")
+        with pytest.raises(ConflictError, match="Another vehicle"):
+            await another
+        assert (bench.desk.state.asked, bench.vehicle.told, bench.sets) == (None, [], 0)
+
+    runner.run(scenario())
+
+
+def test_a_return_is_judged_by_what_the_vehicle_holds_now_and_its_verdict_is_gone_at_once(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        bench.vehicle.parameters = {}
+        judging = asyncio.ensure_future(bench.desk.run())
+        try:
+            bench.desk.on_state(bench.state)
+            bench.moves(20.0)
+            await shows(lambda: bench.desk.state.ret)
+            first = bench.desk.state.ret
+            assert first is not None
+            assert first.state == "not_certified", "no return height is told"
+            bench.vehicle.parameters = {"RTL_ALT": 6000.0}
+            bench.desk.on_changed()
+            assert bench.desk.state.ret is not None
+            assert bench.desk.state.ret.state == "unknown"
+            await shows(lambda: bench.desk.state.ret and bench.desk.state.ret.state != "unknown")
+            assert "return_unknown" not in [reason.code for reason in bench.desk.state.ret.reasons]
+            bench.moves(10.0)
+            assert [reason.text for reason in bench.desk.state.ret.reasons] == ["Home has moved again."]
+        finally:
+            judging.cancel()
+
+    runner.run(scenario())
+
+
+def test_what_nobody_foresaw_leaves_the_return_unknown_and_the_server_running(
+    made: Made, lane: Lane, runner: asyncio.Runner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        monkeypatch.setattr(bench.vehicle, "call", lambda request: 1 / 0)
+        judging = asyncio.ensure_future(bench.desk.run())
+        try:
+            bench.desk.on_state(bench.state)
+            bench.moves(20.0)
+            await shows(lambda: bench.desk.state.ret)
+            assert bench.desk.state.ret is not None
+            assert bench.desk.state.ret.state == "unknown"
+            assert "server's own error" in bench.desk.state.ret.reasons[0].text
+            assert not judging.done()
         finally:
             judging.cancel()
 

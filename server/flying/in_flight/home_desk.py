@@ -6,14 +6,15 @@ The return is judged by a worker, one judgement at a time; what has changed mean
 from __future__ import annotations
 
 import asyncio
+import logging
 import secrets
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from mapping.errors import DescribedError
 from mapping.geometry.frames import apart_m
-from server.errors import CheckNeededError, ConflictError, NotFoundError
+from server.errors import CheckNeededError, ConflictError, NotFoundError, reported
 from server.flying.in_flight.home_task import HomeJudged, judge_home, judge_return
 from server.flying.in_flight.way_desk import WayDesk
 from server.flying.in_flight.way_task import WayAsked
@@ -37,10 +38,15 @@ from telemetry.mavlink.believing import is_in_the_air
 from telemetry.topics.requests import Operator, SetHome
 from telemetry.topics.vehicle import VehicleState
 
+_log = logging.getLogger(__name__)
 ANYWHERE = WayBody(action="home")
 """Gathers what every way is judged by."""
-FLOWN_M, OLD_S = 10.0, 15.0
-"""A return is judged again from so far away, or so much later, while home lies elsewhere than at the take-off."""
+FLOWN_M, OLD_S, OLDEST_S = 10.0, 15.0, 60.0
+"""A return is judged again from so far away, and after so long wherever it is, while home lies elsewhere than at the
+take-off: sensors see more meanwhile."""
+MOVED_M = 2.0
+"""A vehicle that was moved further is not "here" any more."""
+HOME_MOVED_AGAIN = "Home has moved again."
 LOOK_EVERY_S = 1.0
 
 
@@ -64,18 +70,23 @@ class HomeDesk:
         lane: Lane,
         pages: Pages,
         server: Callable[[], Operator],
+        home_set: Callable[[], None],
     ) -> None:
-        """``ways``: gathers what is judged by; ``server``: in whose name it is asked for without a pilot."""
+        """``ways``: gathers what is judged by; ``server``: in whose name it is asked for without a pilot; ``home_set``:
+        home was, or may have been, set by order."""
         self._link, self._live, self._ways, self._lane, self._pages = link, live, ways, lane, pages
-        self._server = server
+        self._server, self._home_set = server, home_set
         self._asked: HomeAskedDoc | None = None
         self._asked_mono_s = 0.0
         self._is_judging = self._is_judging_return = False
         self._judged: _Judged | None = None
         self._heard: HomePlace | None = None
         """Home that was heard first in this flight."""
+        self._adopted: str | None = None
         self._gathered: WayAsked | None = None
-        """What was read from the vehicle in this flight: it is not read again for each judgement."""
+        """What was read from the vehicle while home stood where it does: it is not read again for each judgement."""
+        self._asked_at: tuple[HomePlace | None, tuple[float | None, float | None]] | None = None
+        """Of ``_asked``: home, and where the vehicle was."""
         self._told = HomeState()
         self._moved = asyncio.Event()
 
@@ -92,12 +103,15 @@ class HomeDesk:
         """Nothing is set. Raises what the vehicle said, NotAllowedError, NotReadyError."""
         if self._is_judging:
             raise ConflictError("Another home is being judged.", advice="Wait until it is done.")
-        self._asked, self._is_judging = None, True
+        self._asked, self._is_judging, vehicle = None, True, self._adopted
         self._tell()
         try:
-            asked = self._gathered = await self._ways.asked(operator, ANYWHERE)
+            asked = await self._ways.asked(operator, ANYWHERE)
             place = None if body.place is None else (body.place.lat_deg, body.place.lon_deg)
             judged: HomeJudged = await self._lane.call(judge_home, asked, place)
+            if vehicle != self._adopted:
+                raise ConflictError("Another vehicle was adopted meanwhile.", advice="Ask for home again.")
+            self._asked_at = home_of(asked.state), (asked.state.lat_deg, asked.state.lon_deg)
             self._asked, self._asked_mono_s = self._doc(judged, asked.state, is_here=place is None), time.monotonic()
         finally:
             self._is_judging = False
@@ -112,7 +126,11 @@ class HomeDesk:
         if time.monotonic() - self._asked_mono_s > CHECK_FRESH_S:
             what = f"That home was judged more than {CHECK_FRESH_S:.0f} s ago."
             raise CheckNeededError(what, advice="Ask for it again.")
-        await self._link.call(SetHome(operator, asked.lat_deg, asked.lon_deg, asked.alt_amsl_m))
+        self._check_still(asked)
+        try:
+            await self._link.call(SetHome(operator, asked.lat_deg, asked.lon_deg, asked.alt_amsl_m))
+        finally:
+            self._home_set()
         if self._asked is asked:
             self._asked = None
         self._tell()
@@ -127,16 +145,31 @@ class HomeDesk:
         """Home that has moved in flight is judged at once."""
         home = home_of(state)
         if not (state.armed and is_in_the_air(state)) or home is None:
-            if not state.armed and self._heard is not None:
+            if not state.armed and (self._heard or self._gathered) is not None:
                 self._judged = self._heard = self._gathered = None
                 self._tell()
             return
         self._heard = self._heard or home_of_takeoff(self._live.track.states) or home
         if self._judged is not None:
             if not is_there(home, self._judged.home):
-                self._moved.set()
+                self._out_of_date(home, HOME_MOVED_AGAIN)
             return
         if not is_there(home, self._heard):
+            self._moved.set()
+
+    def on_link(self, vehicle: str | None) -> None:
+        """Id of the adopted one: what was judged for another is not this one's."""
+        if vehicle != self._adopted:
+            self._adopted = vehicle
+            self.forget()
+
+    def on_changed(self) -> None:
+        """Parameters, fence, rally points or mission of the vehicle are others, or may be: they are read anew, and what
+        was judged by those before counts no more."""
+        self._gathered = None
+        if self._judged is not None:
+            self._out_of_date(self._judged.home, "What the vehicle holds was changed.")
+        elif self._is_judging_return:
             self._moved.set()
 
     def forget(self) -> None:
@@ -146,7 +179,7 @@ class HomeDesk:
         self._tell()
 
     async def run(self) -> None:
-        """Judges the return whenever home has moved, and again while the vehicle flies on."""
+        """Judges the return whenever home has moved, and again while the vehicle flies on or hovers."""
         while True:
             try:
                 async with asyncio.timeout(LOOK_EVERY_S):
@@ -157,12 +190,36 @@ class HomeDesk:
             self._moved.clear()
             await self._judge_return()
 
+    def _out_of_date(self, home: HomePlace, words: str) -> None:
+        """What was judged is not shown as it was while it is judged anew."""
+        assert self._judged is not None
+        self._judged = replace(self._judged, home=home, doc=_unknown(words, "It is being judged anew."))
+        self._gathered = None
+        self._moved.set()
+        self._tell()
+
+    def _check_still(self, asked: HomeAskedDoc) -> None:
+        """Raises CheckNeededError where home, or for "here" the vehicle, is not where it was when that was judged."""
+        state, at = self._live.state, self._asked_at
+        if state is None or at is None:
+            raise CheckNeededError("The vehicle is not heard.", advice="Connect it, then ask for home again.")
+        home, (lat_deg, lon_deg) = at
+        if home is None or not is_there(home_of(state), home):
+            raise CheckNeededError("Home was moved since that was judged.", advice="Ask for home again.")
+        if not asked.is_here:
+            return
+        known = lat_deg is not None and lon_deg is not None and state.lat_deg is not None and state.lon_deg is not None
+        if not known or apart_m((lat_deg or 0, lon_deg or 0), (state.lat_deg or 0, state.lon_deg or 0)) > MOVED_M:
+            raise CheckNeededError("The vehicle has moved since that was judged.", advice="Ask for home again.")
+
     def _is_due(self) -> bool:
         state, judged = self._live.state, self._judged
         if judged is None or state is None or state.lat_deg is None or state.lon_deg is None or not state.armed:
             return False
         if time.monotonic() - judged.doc.judged_mono_s <= OLD_S:
             return False
+        if time.monotonic() - judged.doc.judged_mono_s > OLDEST_S:
+            return True
         return judged.doc.state == "unknown" or apart_m(judged.at_deg, (state.lat_deg, state.lon_deg)) > FLOWN_M
 
     async def _judge_return(self) -> None:
@@ -170,23 +227,33 @@ class HomeDesk:
         home = None if state is None else home_of(state)
         if state is None or home is None:
             return
-        self._is_judging_return = True
+        self._is_judging_return, vehicle = True, self._adopted
         self._tell()
         try:
-            asked = self._gathered or await self._ways.asked(self._server(), ANYWHERE)
-            self._gathered = asked = await self._ways.renewed(asked)
-            doc: ReturnDoc = await self._lane.call(judge_return, asked)
+            doc = await self._judged_return()
         except DescribedError as error:
-            reason = ReasonDoc(code="home", text=error.what, mend=error.advice)
-            doc = ReturnDoc(state="unknown", reasons=[reason], judged_mono_s=time.monotonic())
+            doc = _unknown(error.what, error.advice)
+        except Exception as error:
+            reported(error, _log, "Judging the vehicle's return")
+            doc = _unknown(
+                "The return could not be judged: the server's own error is in its log.", "Do not rely on it."
+            )
         finally:
             self._is_judging_return = False
         now = self._live.state
-        if now is not None and now.armed:
+        if now is not None and now.armed and vehicle == self._adopted:
             self._judged = _Judged(home, (state.lat_deg or 0.0, state.lon_deg or 0.0), doc)
-            if not is_there(home_of(now), home):
-                self._moved.set()  # what was judged is out of date already
+            if not is_there(here := home_of(now), home):
+                self._out_of_date(here or home, HOME_MOVED_AGAIN)
         self._tell()
+
+    async def _judged_return(self) -> ReturnDoc:
+        asked = self._gathered or await self._ways.asked(self._server(), ANYWHERE)
+        self._gathered = asked = await self._ways.renewed(asked)
+        doc: ReturnDoc = await self._lane.call(judge_return, asked)
+        if self._gathered is asked:
+            return doc
+        return _unknown("What the vehicle holds was changed meanwhile.", "It is being judged anew.")
 
     def _doc(self, judged: HomeJudged, state: VehicleState, *, is_here: bool) -> HomeAskedDoc:
         home, now = judged.home, home_of(state)
@@ -208,6 +275,11 @@ class HomeDesk:
         if (state := self.state) != self._told:
             self._told = state
             self._pages.publish(HomeMessage(home=state))
+
+
+def _unknown(what: str, advice: str) -> ReturnDoc:
+    reason = ReasonDoc(code="home", text=what, mend=advice)
+    return ReturnDoc(state="unknown", reasons=[reason], judged_mono_s=time.monotonic())
 
 
 def _changes(rises_m: float, *, in_air: bool, has_mission: bool) -> list[str]:

@@ -65,7 +65,8 @@ def _is_way_home_certified(asked: WayAsked, report: Progress) -> bool:
 
 
 def _home_at(asked: WayAsked, place: tuple[float, float] | None) -> HomePlace:
-    """In the air its height is that of home now, and what the surface model rises from there."""
+    """In the air its height is that of the take-off's home, and what the surface model rises from there: home as it
+    is now may have been moved to any height."""
     from planning.certificate.home_stand import ground_at
     from telemetry.flight.home_height import home_off_m
 
@@ -82,15 +83,17 @@ def _home_at(asked: WayAsked, place: tuple[float, float] | None) -> HomePlace:
         return HomePlace(
             lat_deg, lon_deg, _stands_amsl_m(state, found.low_dsm_m, found.high_dsm_m, ground.vertical_datum)
         )
-    now = home_of(state)
-    home_off_m(ground, asked.took_off, state)  # refuses one whose height nobody knows
-    assert now is not None
-    now_xy_m = ground.xy_from_lat_lon(np.array([[now.lat_deg, now.lon_deg]]))
-    rises_m = found.alt_dsm_m - float(ground.elevation_at(now_xy_m)[0])
+    took_off = asked.took_off
+    if took_off is None:
+        home_off_m(ground, None, state)  # refuses one whose height nobody knows
+    began = took_off or home_of(state)
+    assert began is not None
+    began_xy_m = ground.xy_from_lat_lon(np.array([[began.lat_deg, began.lon_deg]]))
+    rises_m = found.alt_dsm_m - float(ground.elevation_at(began_xy_m)[0])
     if not math.isfinite(rises_m):
-        what = "The surface model knows no height at home as it is now: how much the other lies higher is not known."
+        what = "The surface model knows no height where home was at first: how much the other lies higher is not known."
         raise NotAllowedError(what, where="home", advice="Open the model that the flight began over.")
-    return HomePlace(lat_deg, lon_deg, now.alt_amsl_m + rises_m)
+    return HomePlace(lat_deg, lon_deg, began.alt_amsl_m + rises_m)
 
 
 def _stands_amsl_m(state: VehicleState, low_dsm_m: float, high_dsm_m: float, datum: str | None) -> float:

@@ -34,8 +34,9 @@ from telemetry.bus.link_client import LinkClient
 from telemetry.errors import NoVehicleError
 from telemetry.flight.certified_way import way_notes, way_request
 from telemetry.flight.guided.beginning import why_moves
-from telemetry.flight.home_watch import home_of_takeoff
+from telemetry.flight.home_watch import HomePlace, home_of, home_of_takeoff, is_there
 from telemetry.flight.preflight.parameters import NAMES
+from telemetry.mavlink.believing import is_in_the_air
 from telemetry.topics.messages import FlightStatus
 from telemetry.topics.onboard_lists import PlacesOnboard
 from telemetry.topics.requests import DownloadPlaces, Operator, ReadParameters, SetSpeed
@@ -51,6 +52,8 @@ class _InHand:
     doc: WayDoc
     judged: WayJudged
     judged_mono_s: float
+    home: HomePlace | None
+    """From which its heights count."""
     flies_since_utc_s: float | None = None
 
 
@@ -91,9 +94,10 @@ class WayDesk:
         self._in_hand, self._is_judging, vehicle = flown, True, self._adopted
         self._tell()
         try:
-            judged: WayJudged = await self._lane.call(judge_way, await self.asked(operator, body))
+            asked = await self.asked(operator, body)
+            judged: WayJudged = await self._lane.call(judge_way, asked)
             self._check_still(vehicle, flown)
-            self._in_hand = _InHand(_doc(judged, body, terrain), judged, time.monotonic())
+            self._in_hand = _InHand(_doc(judged, body, terrain), judged, time.monotonic(), home_of(asked.state))
         finally:
             self._is_judging = False
             self._tell()
@@ -112,6 +116,7 @@ class WayDesk:
             first = doc.reasons[0] if doc.reasons else None
             what = "The way is not certified" + ("." if first is None else f": {first.text}")
             raise NotCertifiedError(what, advice="" if first is None else first.mend)
+        self._check_home(in_hand)
         since_utc_s = time.time()
         request = way_request(operator, judged.way, judged.wish, speed_m_s=judged.speed_m_s, most_m_s=judged.most_m_s)
         await self._link.call(request)
@@ -188,6 +193,16 @@ class WayDesk:
         )
 
     # How
+
+    def _check_home(self, in_hand: _InHand) -> None:
+        """Raises CheckNeededError where home was moved since: the way's places would be elsewhere. A vehicle on the
+        ground takes its home when it arms, which is looked at then."""
+        state, home = self._vehicle(), in_hand.home
+        if not (state.armed and is_in_the_air(state)) or (home is not None and is_there(home_of(state), home)):
+            return
+        self._in_hand = None
+        self._tell()
+        raise CheckNeededError("Home was moved since the way was judged.", advice="Ask for the way again.")
 
     def _check_still(self, vehicle: str | None, flown: _InHand | None) -> None:
         """Raises ConflictError for a way that nobody can fly any more, once it is judged."""
