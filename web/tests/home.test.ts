@@ -21,22 +21,24 @@ const told = (ret: ReturnDoc | null, is_judging_return = false) =>
   (home.value = { asked: null, is_judging: false, ret, is_judging_return });
 
 describe("what Return says of itself", () => {
-  beforeEach(forgetHome);
+  beforeEach(() => (forgetHome(), forgetClock()));
 
-  it("says nothing while home is where it was", () => expect(returnTitle()).toBeNull());
+  it("says nothing while home is where it was", () => expect(returnTitle(1000)).toBeNull());
 
   it("says that it is being judged, and then what is in the way", () => {
     told(null, true);
-    expect(returnTitle()).toContain("being judged");
+    expect(returnTitle(1000)).toContain("being judged");
     told(CLEAR);
-    expect(returnTitle()).toBe("Return certified");
+    expect(returnTitle(1000)).toBe("Return certified");
+    takeClock({ v: 1, type: "clock", page_ms: 1000, now_mono_s: 130 }, 1000);
+    expect(returnTitle(1000)).toBe("Return certified, 0:30 ago");
     told(BLOCKED, true);
-    expect(returnTitle()).toBe("RETURN NOT CLEAR: It needs 30 m.");
+    expect(returnTitle(1000)).toBe("RETURN NOT CLEAR, being judged anew: It needs 30 m.");
   });
 
   it("is never called clear where it could not be judged", () => {
     told({ ...BLOCKED, state: "unknown", reasons: [] });
-    expect(returnTitle()).toBe("RETURN NOT JUDGED");
+    expect(returnTitle(1000)).toBe("RETURN NOT JUDGED");
   });
 });
 

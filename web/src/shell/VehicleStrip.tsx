@@ -10,6 +10,7 @@ import {
   nodeWord,
 } from "../vehicle/vehicle_words";
 import { returnTitle } from "../vehicle/return_words";
+import { now_ms } from "../store/clock";
 import { wayInUse } from "../vehicle/way_words";
 import {
   adopted,
@@ -72,7 +73,7 @@ function Safety() {
         kind="return"
         place={SAFETY}
         disabled={!mayCommand}
-        title={why ?? returnTitle() ?? "Return home and land"}
+        title={why ?? returnTitle(now_ms.value) ?? "Return home and land"}
         testid="return-home"
         onHold={() => void returnHome()}
       />

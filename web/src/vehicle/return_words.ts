@@ -1,3 +1,4 @@
+import { duration } from "../format";
 import type { ReturnDoc } from "../messages";
 import { home } from "../store/home";
 import { serverNow_s } from "../store/server_clock";
@@ -18,10 +19,12 @@ export function returnAge_s(ret: ReturnDoc, now_ms: number): number | null {
   return now_s === null ? null : Math.max(0, now_s - ret.judged_mono_s);
 }
 
-/** What the button Return says of itself since home was moved; null: nothing. */
-export function returnTitle(): string | null {
+/** What the button Return says of itself since home was moved; null: nothing. What is judged anew is not called clear. */
+export function returnTitle(now_ms: number): string | null {
   const { ret, is_judging_return } = home.value;
   if (!ret) return is_judging_return ? "Home was moved: the return is being judged" : null;
+  const age_s = returnAge_s(ret, now_ms);
+  const when = is_judging_return ? ", being judged anew" : age_s === null ? "" : `, ${duration(age_s)} ago`;
   const first = ret.reasons[0];
-  return `${WORDS[ret.state]}${ret.state !== "certified" && first ? `: ${first.text}` : ""}`;
+  return `${WORDS[ret.state]}${when}${ret.state !== "certified" && first ? `: ${first.text}` : ""}`;
 }
