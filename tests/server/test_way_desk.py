@@ -225,6 +225,19 @@ def test_a_way_that_was_judged_long_ago_is_asked_for_again(
     runner.run(scenario())
 
 
+def test_a_way_that_was_judged_before_home_moved_is_not_flown(made: Made, lane: Lane, runner: asyncio.Runner) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        way = await bench.judged(action="home")
+        assert bench.live.state is not None
+        bench.live.state = replace(bench.live.state, home_alt_amsl_m=(bench.live.state.home_alt_amsl_m or 0.0) - 0.8)
+        with pytest.raises(CheckNeededError, match="Home was moved"):
+            await bench.desk.fly(ME, FlyWayBody(id=way.id))
+        assert bench.desk.state.way is None
+
+    runner.run(scenario())
+
+
 def test_a_way_that_was_judged_for_another_vehicle_is_not_this_one_s(
     made: Made, lane: Lane, runner: asyncio.Runner
 ) -> None:
