@@ -112,7 +112,7 @@ class Settings(BaseSettings):
     allowed_origins: Names = ()
     """Further origins, such as https://gcs.example when a proxy adds TLS, separated by commas."""
     upload_limit_bytes: Annotated[int, Field(gt=0)] = 2 * GIB
-    """Largest surface model, orthophoto, recording or radar file that can be dropped in."""
+    """Largest surface model, orthophoto, recording, ROS bag or radar file that can be dropped in."""
     dsm_urls: Names = ()
     """Addresses below which the command line may read surface models by HTTP ranges, separated by commas:
     https://maps.example/dsm/. Nothing else is asked for, redirects are not followed."""

@@ -37,7 +37,14 @@ DRAIN_LIMIT_BYTES = 64 * 1024**2
 DRAIN_TIMEOUT_S = 5.0
 SAFE_METHODS = frozenset({"GET", "HEAD", "OPTIONS"})
 UPLOADS = frozenset(
-    {"/api/terrains", "/api/orthophotos", "/api/recordings/import", "/api/traversability/uwb", "/api/radar/files"}
+    {
+        "/api/terrains",
+        "/api/orthophotos",
+        "/api/recordings/import",
+        "/api/bags",
+        "/api/traversability/uwb",
+        "/api/radar/files",
+    }
 )
 # Neither can be sent across origins without a preflight, which nothing here answers.
 BODY_TYPES = frozenset({"application/json", "application/octet-stream"})
@@ -131,7 +138,7 @@ class Guard:
     async def _http(self, scope: Scope, receive: Receive, send: Send) -> None:
         headers = Headers(scope=scope)
         started, status = time.monotonic(), 0
-        body = _Metered(receive, self._body_limit(scope["path"]))
+        body = _Metered(receive, self.body_limit(scope["path"]))
 
         async def dressed(message: Message) -> None:
             nonlocal status
@@ -168,24 +175,25 @@ class Guard:
     def _refusal(self, scope: Scope, headers: Headers) -> Response | None:
         try:
             self._door.check(scope, headers)
-            _check_body(headers, self._body_limit(scope["path"]))
+            _check_body(headers, self.body_limit(scope["path"]), is_upload=scope["path"] in UPLOADS)
         except ServerError as error:
             return _answer(error)
         return None
 
-    def _body_limit(self, path: str) -> int:
+    def body_limit(self, path: str) -> int:
+        """In bytes."""
         if path in UPLOADS:
             return self._upload_limit
         is_small_file = path in _SMALL_FILES or _CAPTURES.fullmatch(path) is not None
         return IMPORT_LIMIT_BYTES if is_small_file else JSON_LIMIT_BYTES
 
 
-def _check_body(headers: Headers, limit: int) -> None:
+def _check_body(headers: Headers, limit: int, *, is_upload: bool) -> None:
     length = headers.get("content-length", "0")
     if not length.isascii() or not length.isdigit() or len(length) > 18:
         raise TooLargeError(f"Content-Length {length!r} is not a size.")
     if int(length) > limit:
-        raise too_large(limit)
+        raise too_large(limit, is_setting=is_upload)
     if int(length) == 0 and "transfer-encoding" not in headers:
         return
     kind = headers.get("content-type", "").partition(";")[0].strip().lower()
@@ -195,10 +203,12 @@ def _check_body(headers: Headers, limit: int) -> None:
         )
 
 
-def too_large(limit: int) -> TooLargeError:
+def too_large(limit: int, *, is_setting: bool) -> TooLargeError:
+    """``is_setting``: the operator can raise it."""
+    smaller = "Crop or downsample a raster, record fewer frames, or raise the setting upload_limit_bytes."
     return TooLargeError(
         f"The body is larger than {limit / 1024**2:,.0f} MiB.",
-        advice="Crop or downsample a raster, record fewer frames, or raise the setting upload_limit_bytes.",
+        advice=smaller if is_setting else "Send less at once: no setting raises this limit.",
     )
 
 
@@ -226,7 +236,7 @@ class _Metered:
         self._seen += len(message.get("body", b""))
         self._complete = not message.get("more_body", False)
         if self._seen > self._limit:
-            raise HTTPException(413, too_large(self._limit).what)
+            raise HTTPException(413, too_large(self._limit, is_setting=True).what)
         return message
 
     async def drain(self) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from planning.errors import DescribedError
+from server.door import guard
 from server.errors import BadRequestError, NotFoundError, TooLargeError
 from server.flying.bags import bag_task
 from server.flying.bags.bag_desk import MOST_KEPT, BagDesk
@@ -20,6 +21,7 @@ from server.schemas import BagDoc, BagRecordingBody
 from telemetry.errors import RecordingError
 from telemetry.recording.describe import describe_recording
 from telemetry.recording.flight_log import read_flight_log
+from tests.server.running import running
 from tests.telemetry.bags import write_bag
 from tests.telemetry.test_ros_bags import Flight
 
@@ -181,3 +183,18 @@ def test_an_archive_of_too_much_is_refused_before_it_is_unpacked(
     with pytest.raises(TooLargeError, match="are the most"):
         bag_task.unpacked(tmp_path / "a.zip", tmp_path / "out", "a.zip", report=said_nothing)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_bag_of_more_than_what_json_may_be_is_taken(tmp_path: Path, bags: dict[str, Path]) -> None:
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w") as packed:
+        packed.write(bags["ros1"], "run.bag")
+        packed.writestr("video.avi", bytes(guard.JSON_LIMIT_BYTES))
+    with running(tmp_path / "data") as server:
+        fleet: Any = server.parts.fleet
+        board: Any = AtOnce()
+        fleet.bags = BagDesk(server.parts.library, board, fleet.recordings)
+        raw = {"Content-Type": "application/octet-stream"}
+        answer = server.http.post("/api/bags", params={"filename": "run.zip"}, content=data.getvalue(), headers=raw)
+        assert answer.status_code == 200, answer.text
+        assert answer.json()["topics"][0]["name"] == "/points"

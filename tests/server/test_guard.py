@@ -9,18 +9,23 @@ import socket
 import threading
 import time
 from collections.abc import Iterator
+from typing import TypeGuard
 
 import httpx
 import pytest
+from fastapi.routing import APIRoute
 from starlette.datastructures import Headers
+from starlette.types import Receive, Scope, Send
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
+from server.api.terrain_routes import RAW_BODY
 from server.door import guard
 from server.door.guard import Door
 from server.errors import ForbiddenError
 from server.settings import Settings
+from server.web import ROUTERS
 from server.work.logs import OneLineFormatter
 from tests.server.running import Running
 
@@ -160,6 +165,40 @@ def test_huge_json_is_refused(served: Running) -> None:
     body = b'{"x":"' + b"a" * guard.JSON_LIMIT_BYTES + b'"}'
     response = served.http.put("/api/plan", content=body, headers={"Content-Type": "application/json"})
     assert (response.status_code, response.json()["code"]) == (413, "too_large")
+
+
+def test_huge_json_is_not_told_to_raise_a_setting(served: Running) -> None:
+    body = b'{"x":"' + b"a" * guard.JSON_LIMIT_BYTES + b'"}'
+    advice = served.http.put("/api/plan", content=body, headers={"Content-Type": "application/json"}).json()["advice"]
+    assert "no setting" in advice
+    assert "upload_limit_bytes" not in advice
+
+
+_SMALL = (
+    "/api/plan/import",
+    "/api/parameters/compare",
+    "/api/parameters/descriptions",
+    "/api/radar/files/{file_id}/capture",
+)
+SMALL = {"/api/radar/files/{file_id}/cfg": 2**20, **dict.fromkeys(_SMALL, guard.IMPORT_LIMIT_BYTES)}
+"""Routes of raw files that are smaller than what the setting allows, and how large theirs may be."""
+
+
+def test_every_route_of_raw_files_takes_what_the_setting_allows() -> None:
+    paths = {route.path for module in ROUTERS for route in module.router.routes if _is_raw(route)}
+    assert paths >= {"/api/terrains", "/api/bags", *SMALL}
+    assert paths - SMALL.keys() == guard.UPLOADS
+    limits = guard.Guard(_nowhere, Settings(upload_limit_bytes=2**40))
+    assert all(limits.body_limit(path) == 2**40 for path in guard.UPLOADS)
+    assert all(limits.body_limit(path.replace("{file_id}", "0a")) >= most for path, most in SMALL.items())
+
+
+def _is_raw(route: object) -> TypeGuard[APIRoute]:
+    return isinstance(route, APIRoute) and route.openapi_extra == RAW_BODY
+
+
+async def _nowhere(scope: Scope, receive: Receive, send: Send) -> None:
+    """An app that nobody asks."""
 
 
 def test_a_body_that_stops_is_given_up(served: Running, monkeypatch: pytest.MonkeyPatch) -> None:
