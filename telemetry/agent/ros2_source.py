@@ -27,7 +27,7 @@ from telemetry.recording.ros.point_messages import MalformedMessageError, points
 from telemetry.recording.ros.pose_messages import frame_name, pose_of, stamp_ns_of, transform_of
 from telemetry.recording.ros.transforms import Gap, Transform
 from telemetry.ros2.address import ZenohAddress
-from telemetry.ros2.clocks import StampClock
+from telemetry.ros2.clocks import Measured, SessionClocks
 from telemetry.ros2.frames import FrameError, LiveTransforms
 from telemetry.ros2.listener import Heard, Ros2Listener
 from telemetry.ros2.watch import TopicWatch
@@ -41,7 +41,6 @@ WAIT_S = 0.3
 POSES_MOST_HZ = 50.0
 _MOST_GAP_NS = round(MOST_GAP_S * 1e9)
 _MOST_WAITING = 8
-_MOST_CLOCKS = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,14 +88,16 @@ class Ros2Source:
     ) -> None:
         """``tell`` hears what goes wrong, and what is right again."""
         self._asked, self._address, self._tell, self._now = asked, address, tell, now
-        self._listener = Ros2Listener(asked.domain, asked.rows)
+        self._listener = Ros2Listener(asked.domain, asked.rows, timeless=frozenset({TF_STATIC_TOPIC}))
         self._words = Words(tell=tell, now=now)
         self._watch = TopicWatch(self._listener, self._words, _needed(asked), now=now)
         self._transforms = LiveTransforms()
-        self._clocks: dict[bytes, StampClock] = {}
+        self._clocks = SessionClocks(self._listener.graph.session_of)
         self._waiting: deque[_Waiting] = deque()
         self._lost = 0
         self._base, self._pose_t_s = asked.base or BASE_LINK, -1.0
+        self._world = self._root = ""
+        """Where transforms tell the pose: the frame in which all poses are, and the root of the tree as it is now."""
         self.status = Ros2Status(self._listener)
 
     def readings(self) -> Iterator[Reading]:
@@ -138,9 +139,11 @@ class Ros2Source:
         if reason not in self.status.left_out and len(self.status.left_out) > 200:
             reason = "various reasons"
         self.status.left_out[reason] += 1
-        self._words.begins(f"left out {topic}", f"{topic}: left out, {why[:160]}.")
+        self._words.recurs(f"{topic} is left out", f"{topic}: left out, {why[:160]}.")
 
     def _take_transforms(self, heard: Heard) -> None:
+        if heard.topic != TF_STATIC_TOPIC:  # which may have been published at any time
+            self._measured(heard, 0)
         for each in heard.message.transforms:
             try:
                 found, stamp_ns = transform_of(each), stamp_ns_of(each.header)
@@ -154,11 +157,11 @@ class Ros2Source:
         points, without_place = points_of(heard.message, heard.type)
         self.status.without_place += without_place
         if self._asked.sensor == "radar":
-            _check_radar(points)
+            points = self._whole_targets(heard.topic, points)
         header = heard.message.header
-        t_mono_s, clock = self._measured(heard, header)
-        self.status.clock_offset_s = clock.offset_s
-        self._watch.offset(heard.topic, clock.offset_s)
+        t_mono_s = self._measured_now(heard, header)
+        self.status.clock_offset_s = offset_s = self._clocks.of(heard.topic, heard.gid).offset_s
+        self._watch.offset(heard.topic, offset_s)
         stamp_ns = stamp_ns_of(header) or heard.source_ns
         lost, self._lost = self._lost + heard.lost, 0
         frame, until_s = frame_name(header.frame_id), self._now() + WAIT_S
@@ -167,25 +170,45 @@ class Ros2Source:
             self._give_up(self._waiting.popleft(), place if isinstance(place, str) else "it came too late")
         self._waiting.append(_Waiting(t_mono_s, stamp_ns, frame, points, lost, until_s))
 
-    def _measured(self, heard: Heard, header: Any) -> tuple[float, StampClock]:
-        if heard.gid not in self._clocks and len(self._clocks) >= _MOST_CLOCKS:
-            self._clocks.clear()
-        clock = self._clocks.setdefault(heard.gid, StampClock())
-        measured = clock.on_message(
-            stamp_ns=stamp_ns_of(header), source_ns=heard.source_ns,
+    def _whole_targets(self, topic: str, points: NDArray[np.void]) -> NDArray[np.void]:
+        """A target whose speed or strength nobody knows could not be told from the ground, nor be kept as an obstacle.
+
+        Raises MalformedMessageError where there is no other: that must not look like an empty air.
+        """
+        whole = np.isfinite(points["speed_m_s"]) & np.isfinite(points["snr_db"])
+        missing = len(points) - int(np.count_nonzero(whole))
+        if missing and missing == len(points):
+            what = "its points tell no radial speed, or no strength in dB (snr); read them with --sensor vision"
+            raise MalformedMessageError(what)
+        if missing:
+            self.status.without_speed += missing
+            self._words.recurs(f"{topic} has gaps", f"{topic}: targets without a speed or strength are left out.")
+        return points[whole]
+
+    def _measured(self, heard: Heard, stamp_ns: int) -> Measured:
+        return self._clocks.of(heard.topic, heard.gid).on_message(
+            stamp_ns=stamp_ns, source_ns=heard.source_ns, gid=heard.gid,
             received_mono_s=heard.received_mono_s, received_utc_s=heard.received_utc_s,
         )  # fmt: skip
+
+    def _measured_now(self, heard: Heard, header: Any) -> float:
+        """Monotonic time. Raises MalformedMessageError for what was published before anybody listened here."""
+        measured = self._measured(heard, stamp_ns_of(header))
+        if measured.published_mono_s < self._listener.since_mono_s:
+            raise MalformedMessageError("it was published before this agent listened")
         self.status.odd_stamps += measured.is_odd
         if measured.is_odd:
             advice = "Its frames count as measured when they were published; set the sensor's clock."
-            self._words.begins(f"stamp {heard.topic}", f"{heard.topic}: its stamps are of another clock.", advice)
-        return measured.t_mono_s, clock
+            self._words.recurs(
+                f"{heard.topic} has other stamps", f"{heard.topic}: its stamps are of another clock.", advice
+            )
+        return measured.t_mono_s
 
     def _take_pose(self, heard: Heard) -> Iterator[Slam]:
         found = pose_of(heard.message, heard.type)
         if self._asked.base is None and found.child:
             self._base = found.child
-        t_mono_s, _ = self._measured(heard, heard.message.header)
+        t_mono_s = self._measured_now(heard, heard.message.header)
         if not self._pose_t_s - t_mono_s >= 0.0 and t_mono_s - self._pose_t_s < 1.0 / POSES_MOST_HZ:
             return
         pose = Transform(quaternions.rotation(found.q_wxyz), found.xyz_m)
@@ -215,7 +238,7 @@ class Ros2Source:
             way, pose = place
             if pose is not None:
                 self.status.poses += 1
-                yield _slam(first.t_mono_s, pose)
+                yield _slam(first.t_mono_s, pose, tracking="lost" if self._root_changed() else "good")
             yield self._reading(first, way)
 
     def _place(self, waiting: _Waiting) -> tuple[Transform, Transform | None] | str:
@@ -225,11 +248,25 @@ class Ros2Source:
             return _gap_words(waiting.frame, self._base, way)
         if self._asked.pose not in (TF_TOPIC, TF_STATIC_TOPIC):
             return way, None
-        world = self._transforms.ancestors(self._base)[-1]
+        root = self._transforms.ancestors(self._base)[-1]
+        world = self._world or root
         if world == self._base:
             return f"no transform leads on from {self._base[:60]}"
+        if not self._transforms.moves(self._base, world):
+            return f"all transforms from {self._base[:60]} to {world[:60]} are static: none tells where the robot is"
         pose = self._transforms.at(world, self._base, waiting.stamp_ns, _MOST_GAP_NS)
         return (way, pose) if isinstance(pose, Transform) else _gap_words(self._base, world, pose)
+
+    def _root_changed(self) -> bool:
+        """Poses stay in the frame that was the root at the first placed frame; whoever counts on another one hears."""
+        before, self._root = self._root, self._transforms.ancestors(self._base)[-1]
+        self._world = self._world or self._root
+        if before in ("", self._root):
+            return False
+        advice = f"Poses stay in {self._world[:60]}; start the agent again to have them in {self._root[:60]}."
+        what = f"The root of the robot's frames is {self._root[:60]} now, and was {before[:60]}."
+        self._words.recurs("root", what, advice)
+        return True
 
     def _give_up(self, waiting: _Waiting, why: str) -> None:
         self._lost += 1 + waiting.lost
@@ -238,7 +275,7 @@ class Ros2Source:
         self.status.unplaced[why] += 1
         names = ", ".join(self._transforms.names[:12]) or "none"
         advice = f"Publish it, or name the robot's frame with --frame; frames: {names}."
-        self._words.begins("no transform", f"Frames cannot be placed: {why}.", advice)
+        self._words.recurs("no transform", f"Frames cannot be placed: {why}.", advice)
 
     def _reading(self, waiting: _Waiting, way: Transform) -> RadarReading | CloudReading:
         self.status.frames += 1
@@ -259,22 +296,15 @@ def _needed(asked: Ros2Asked) -> dict[str, frozenset[str]]:
     return needed
 
 
-def _check_radar(points: NDArray[np.void]) -> None:
-    """A target whose speed or strength nobody knows could not be told from the ground, nor be kept as an obstacle."""
-    for column, what in (("speed_m_s", "radial speed"), ("snr_db", "strength in dB (snr)")):
-        if len(points) and bool(np.isnan(points[column]).all()):
-            raise MalformedMessageError(f"its points tell no {what}; read them with --sensor vision")
-
-
 def _gap_words(source: str, target: str, gap: Transform | Gap | None) -> str:
     if isinstance(gap, Gap):
         return f"no transform from {gap.child[:60]} to {gap.parent[:60]} at its time"
     return f"no transform from {source[:60]} to {target[:60]}"
 
 
-def _slam(t_mono_s: float, pose: Transform) -> Slam:
+def _slam(t_mono_s: float, pose: Transform, *, tracking: Literal["good", "lost"] = "good") -> Slam:
     """Body right, forward, up -> the frame in which the poses are."""
     R: F64 = pose.R @ FORWARD_LEFT_UP.T
     w, x, y, z = quaternions.from_attitude(*attitude_of(R)).tolist()
     east, north, up = pose.shift_m.tolist()
-    return Slam(t_mono_s, (east, north, up), (w, x, y, z), "good")
+    return Slam(t_mono_s, (east, north, up), (w, x, y, z), tracking)

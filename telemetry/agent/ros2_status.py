@@ -22,6 +22,8 @@ class Ros2Status:
     """Frames, poses and transforms that contradict themselves, by reason."""
     without_place: int = 0
     """Points that were no numbers."""
+    without_speed: int = 0
+    """Targets without a speed or strength."""
     odd_stamps: int = 0
     """Of another clock than their publisher's: they count as measured when they were published."""
     too_many: int = 0
@@ -42,6 +44,7 @@ class Ros2Status:
             "unplaced": dict(self.unplaced),
             "left_out": dict(self.left_out),
             "without_place": self.without_place,
+            "without_speed": self.without_speed,
             "odd_stamps": self.odd_stamps,
             "too_many": self.too_many,
             "clock_offset_s": round(self.clock_offset_s, 4),

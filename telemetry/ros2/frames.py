@@ -90,6 +90,11 @@ class LiveTransforms:
             found.append(link.parent)
         return found
 
+    def moves(self, frame: str, root: str) -> bool:
+        """Whether any transform between them is not static."""
+        above = self.ancestors(frame)
+        return root in above and any(not self._links[name].is_static for name in above[: above.index(root)])
+
     def at(self, target: str, source: str, t_ns: int, most_gap_ns: int) -> Transform | Gap | None:
         """From points of ``source`` to ``target`` at that time; None where nothing connects them."""
         up, down = self.ancestors(source), self.ancestors(target)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections import Counter
@@ -42,9 +43,12 @@ class Heard:
 class Ros2Listener:
     """``hear`` from one thread; all else from any."""
 
-    def __init__(self, domain: int, rows: Mapping[str, int]) -> None:
-        """``rows``: the topics, and how many messages of each wait at most."""
-        self.domain, self.topics = domain, tuple(rows)
+    def __init__(self, domain: int, rows: Mapping[str, int], *, timeless: frozenset[str] = frozenset()) -> None:
+        """``rows``: the topics, and how many messages of each wait at most; ``timeless``: those of which what was said
+        before holds as well, and is asked for."""
+        self.domain, self.topics, self._timeless = domain, tuple(rows), timeless
+        self.since_mono_s = math.inf
+        """When it began to listen."""
         self.graph, self.inbox = Graph(), Inbox(rows)
         self.is_connected = False
         self.interruptions = 0
@@ -71,6 +75,7 @@ class Ros2Listener:
                 failures += 1
         if self._wire is not None:
             self._wire.watch_tokens(grammar.all_tokens(self.domain), self.graph.on_token)
+            self.since_mono_s = time.monotonic()
             for topic in self.topics:
                 self._subscribe(self._wire, topic)
 
@@ -98,7 +103,8 @@ class Ros2Listener:
                 self._refuse(topic, why[:200])
 
     def _subscribe(self, wire: Ros2Wire, topic: str) -> None:
-        wire.subscribe(grammar.any_type_key(self.domain, topic), lambda sample: self.inbox.put(topic, sample))
+        key = grammar.any_type_key(self.domain, topic)
+        wire.subscribe(key, lambda sample: self.inbox.put(topic, sample), asks_kept=topic in self._timeless)
 
     def _on_connection(self, is_there: bool) -> None:
         self.interruptions += self.is_connected and not is_there

@@ -15,8 +15,6 @@ APPEARS_S = 3.0
 """Until it counts as missing that nobody publishes a topic."""
 SILENT_S = 2.0
 """Without a message of a topic of which one had come."""
-MOST_REASONS = 100
-"""That are said in words; further ones are counted only."""
 _MOST_LISTED = 8
 
 
@@ -36,7 +34,9 @@ class TopicWatch:
         self._looked_s, self._connected_s = -math.inf, math.nan
         self._came_s: dict[str, float] = {}
         self._offsets: dict[str, float] = {}
-        self._refused = set[tuple[str, str]]()
+        self._published_s: dict[str, float] = {}
+        """Since when somebody publishes a topic, as is needed, of which nothing has come."""
+        self._refused: dict[tuple[str, str], int] = {}
 
     def came(self, topic: str) -> None:
         """A message of it could be read."""
@@ -87,6 +87,15 @@ class TopicWatch:
             self._words.begins(f"nobody {topic}", f"Nobody publishes {topic}.", self._right(types))
         if SILENT_S <= self._now() - came_s < math.inf:
             self._words.begins(f"silent {topic}", f"{topic}: no message for {SILENT_S:.0f} s.")
+        self._look_for_first(topic, is_right=any(each.key.type in types for each in publishers))
+
+    def _look_for_first(self, topic: str, *, is_right: bool) -> None:
+        """Somebody publishes it, and nothing comes: what was kept from before is not asked for."""
+        if topic in self._came_s or not is_right:
+            self._published_s.pop(topic, None)
+        elif self._now() - self._published_s.setdefault(topic, self._now()) >= APPEARS_S:
+            advice = "What was published before the agent came is not read: how old it is would not be known."
+            self._words.begins(f"silent {topic}", f"{topic}: no message has come yet.", advice)
 
     def _right(self, types: frozenset[str]) -> str:
         right = [found.name for found in self._listener.graph.topics() if found.type in types and found.publishers]
@@ -95,7 +104,7 @@ class TopicWatch:
         return f"No topic of domain {self._listener.domain} has such a type; see hedgehop ros2 topics."
 
     def _look_at_refused(self) -> None:
-        for topic, why in list(self._listener.refused):
-            if (topic, why) not in self._refused and len(self._refused) < MOST_REASONS:
-                self._refused.add((topic, why))
-                self._words.begins(f"refused {topic} {why}", f"{topic}: {why}")
+        for (topic, why), count in list(self._listener.refused.items()):
+            if count != self._refused.get((topic, why)):
+                self._refused[topic, why] = count
+                self._words.recurs(f"{topic} cannot be read", f"{topic}: {why}")

@@ -106,14 +106,18 @@ class Ros2Wire:
         with self._lock:
             return bool(self._transports)
 
-    def subscribe(self, key: str, on_sample: Callable[[WireSample], None]) -> None:
-        """With what publishers have kept: those that are there, and those that come later."""
+    def subscribe(self, key: str, on_sample: Callable[[WireSample], None], *, asks_kept: bool) -> None:
+        """``asks_kept``: with what publishers have kept, those that are there and those that come later. Nothing tells
+        such a message from one of now: only for what holds whenever it was said."""
+
+        def hear(sample: zenoh.Sample) -> None:
+            on_sample(_sample(sample))
+
+        if not asks_kept:
+            self._keep(self._session.declare_subscriber(key, hear))
+            return
         history = zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=MOST_HISTORY)
-        self._keep(
-            zenoh.ext.declare_advanced_subscriber(
-                self._session, key, lambda sample: on_sample(_sample(sample)), history=history
-            )
-        )
+        self._keep(zenoh.ext.declare_advanced_subscriber(self._session, key, hear, history=history))
 
     def watch_tokens(self, pattern: str, on_token: Callable[[str, bool], None]) -> None:
         """``on_token`` hears each liveliness token that is there, comes (True) or goes (False)."""

@@ -16,12 +16,12 @@ from telemetry.recording.ros.ros2_messages import Ros2Messages
 from telemetry.recording.ros.transforms import Gap, Transform
 from telemetry.ros2 import grammar
 from telemetry.ros2.address import zenoh_address
-from telemetry.ros2.clocks import MOST_BEHIND_S, StampClock
+from telemetry.ros2.clocks import MOST_BEHIND_S, SessionClocks, StampClock
 from telemetry.ros2.frames import FrameError, LiveTransforms
 from telemetry.ros2.graph import Graph
 from telemetry.ros2.inbox import Inbox
 from telemetry.ros2.wire import WireSample
-from telemetry.ros2.words import Words
+from telemetry.ros2.words import MOST_REASONS, OVER_S, Words
 
 STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
 TALKER = (
@@ -156,6 +156,69 @@ def test_a_clock_that_is_set_back_is_learnt_anew() -> None:
     assert clock.offset_s == pytest.approx(11.0)
 
 
+def heard_late(clock: StampClock, received_s: float, late_s: float, gid: bytes = b"") -> float:
+    """How old a message counts that was published ``late_s`` before it was received, by a clock 1e6 s ahead."""
+    source_ns = round((1e6 + received_s - late_s) * 1e9)
+    found = clock.on_message(
+        stamp_ns=0, source_ns=source_ns, received_mono_s=received_s, received_utc_s=2e6 + received_s, gid=gid
+    )
+    return received_s - found.t_mono_s
+
+
+@pytest.mark.parametrize("silence_s", [11.0, 29.0, 31.0, 600.0])
+def test_what_comes_late_after_a_silence_is_as_old_as_it_is(silence_s: float) -> None:
+    clock = StampClock()
+    for second in range(40):
+        heard_late(clock, second, 0.01)
+    for place in range(20):
+        assert heard_late(clock, 40.0 + silence_s + place, 10.0) == pytest.approx(9.99, abs=0.07)
+    # All agree: the publisher's clock was set back meanwhile.
+    ages = [heard_late(clock, 40.0 + silence_s + place, 10.0) for place in range(20, 60)]
+    assert ages[-1] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_lone_message_now_and_then_undoes_nothing() -> None:
+    clock = StampClock()
+    heard_late(clock, 0.0, 0.01)
+    ages = [heard_late(clock, 40.0 * number, 10.0) for number in range(1, 60)]
+    assert min(ages) > 9.5
+
+
+def test_one_session_has_one_clock_by_its_shortest_way() -> None:
+    sessions = {b"pose": "robot", b"cloud": "robot"}
+    clocks = SessionClocks(lambda topic, gid: sessions.get(gid))
+    assert heard_late(clocks.of("/points", b"cloud"), 1.0, 0.05, b"cloud") == pytest.approx(0.0, abs=1e-6)
+    assert heard_late(clocks.of("/odom", b"pose"), 1.1, 0.002, b"pose") == pytest.approx(0.0, abs=1e-6)
+    assert heard_late(clocks.of("/points", b"cloud"), 1.2, 0.05, b"cloud") == pytest.approx(0.048, abs=1e-6)
+    # A cloud that is seconds behind the poses is no clock that was set back.
+    assert heard_late(clocks.of("/points", b"cloud"), 3.0, 1.5, b"cloud") == pytest.approx(1.498, abs=1e-6)
+    assert heard_late(clocks.of("/other", b"else"), 3.0, 9.0, b"else") == pytest.approx(
+        0.0, abs=1e-6
+    )  # another machine's
+    sessions.clear()  # its tokens are gone; what was on the way comes still
+    assert heard_late(clocks.of("/points", b"cloud"), 3.1, 1.5, b"cloud") == pytest.approx(1.498, abs=1e-6)
+
+
+def test_a_publishers_session_is_that_of_its_token() -> None:
+    graph = Graph()
+    graph.on_token(TALKER, True)
+    session = TALKER.split("/")[2]
+    assert graph.session_of("/other", grammar.gid_of(TALKER)) == session
+    assert graph.session_of("/chatter", b"x") == session  # nobody else publishes it
+    graph.on_token(TALKER.replace(session, "ab"), True)
+    assert graph.session_of("/chatter", b"x") is None
+    graph.on_token(TALKER, False)
+    assert graph.session_of("/other", grammar.gid_of(TALKER)) is None
+
+
+def test_a_subscription_of_another_definition_is_none_of_the_topics() -> None:
+    graph = Graph()
+    graph.on_token(TALKER, True)
+    graph.on_token(TALKER.replace("/MP/", "/MS/").replace(STRING_HASH, "RIHS01_" + "0" * 64), True)
+    (found,) = graph.topics()
+    assert (found.hashes, found.subscriptions) == ((STRING_HASH,), 1)
+
+
 def test_ways_between_frames_of_now() -> None:
     tree = LiveTransforms()
     tree.add("base", "mast", 0, np.array([0.0, 0.0, 1.0]), NOTHING[1], is_static=True)
@@ -207,3 +270,25 @@ def test_words_are_said_once_and_at_the_pace_that_a_pilot_is_told() -> None:
     for now_s[0] in (0.0, 0.5, 1.0, 1.2, 5.0):
         due += [(now_s[0], word.text) for word in words.due()]
     assert due == [(0.0, "The router is gone."), (1.2, "The router is back.")]
+
+
+def test_each_reason_is_said_and_over_when_it_has_not_come_again() -> None:
+    said: list[str] = []
+    now_s = [0.0]
+    words = Words(tell=said.append, now=lambda: now_s[0])
+    for _ in range(3):
+        words.recurs("/points", "bad fields", "Mend it.")
+        words.recurs("/points", "bad size")
+    assert said == ["bad fields Mend it.", "bad size"]
+    now_s[0] = OVER_S - 1.0
+    words.recurs("/points", "bad size")
+    now_s[0] = OVER_S
+    list(words.due())
+    assert words.held == ["bad size"]
+    assert said[2:] == ["No more: bad fields"]
+    for number in range(50):
+        words.recurs("/points", f"reason {number}")
+    assert len(words.held) == MOST_REASONS + 1
+    assert said[-1] == "/points: for further reasons, too."
+    words.ends("/points", "fine")
+    assert words.held == []

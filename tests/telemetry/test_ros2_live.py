@@ -71,6 +71,19 @@ def test_a_radars_targets_come_through_the_frames_of_the_robot(robot: Process, p
         send_until(robot, lambda: any("messages come again" in each for each in reader.told))
 
 
+def test_a_cloud_that_was_kept_is_not_taken_as_measured_now(robot: Process, port: int) -> None:
+    """A latched cloud of before: nothing on the wire tells how old it is."""
+    robot.do("publisher", topic="/tf_static", kind=TF, keeps=5)
+    robot.do("transforms", topic="/tf_static", rows=[[1, "base_link", "radar", 0.0, 0.0, 0.0, 0.0]])
+    robot.do("publisher", topic="/radar/points", kind=CLOUD, keeps=5)
+    send(robot, points=[[77.0, 0.0, 0.0, 0.0, 20.0]])
+    with reading(RADAR, port) as reader:
+        assert "not read" in reader.wait_told("/radar/points: no message has come yet")
+        send_until(robot, lambda: reader.of(RadarReading))
+        assert {float(each.targets[0, 1]) for each in reader.of(RadarReading)} == {5.0}
+        reader.wait_told("messages come again")
+
+
 def test_a_peer_that_went_is_met_again(port: int) -> None:
     with process(port, "peer") as first, reading(RADAR, port) as reader:
         mount(first)
