@@ -18,15 +18,14 @@ from telemetry.recording.mcap_files.foxglove import enu_from_body_quaternion
 from telemetry.recording.ros.bag_types import CLOUD, FIX, ODOMETRY, POSE
 from telemetry.recording.ros.ros2_export import BASE, HOME
 from telemetry.recording.ros.ros2_messages import DIAGNOSTICS, Ros2Messages
+from telemetry.ros2.standing import StandingAlerts
 from telemetry.topics.deltas import FoldedMap
-from telemetry.topics.messages import Published, Topic
+from telemetry.topics.messages import Published, ServerAlive, Topic
 from telemetry.topics.obstacles import MapDelta, ObstacleAlert
 from telemetry.topics.vehicle import VehicleState
 
 STALE_S = 1.5
 """An attitude this much older than its position is none."""
-LEVELS = {"begins": 2, "goes_on": 2, "ends": 0}
-"""Of diagnostic_msgs/DiagnosticStatus: ERROR while it stands, OK when it has ended."""
 MAPS = {Topic.MAP_RADAR: "radar", Topic.MAP_VISION: "vision", Topic.MAP_RANGES: "ranges"}
 
 
@@ -49,8 +48,8 @@ OUT_TOPICS = (POSE_OUT, ODOM_OUT, FIX_OUT, ALERTS_OUT, *VOXELS_OUT.values())
 class Outgoing:
     """One station's messages, in turn."""
 
-    def __init__(self) -> None:
-        self._messages = Ros2Messages()
+    def __init__(self, now_mono_s: float) -> None:
+        self._messages, self._alerts = Ros2Messages(), StandingAlerts(now_mono_s)
         self._home: tuple[float, float, float] | None = None
         self._position_s, self._maps = -math.inf, {topic: FoldedMap() for topic in MAPS}
         self._deltas: dict[Topic, list[MapDelta]] = {topic: [] for topic in MAPS}
@@ -70,11 +69,26 @@ class Outgoing:
             case VehicleState():
                 yield from self._vehicle(message, shift_s)
             case ObstacleAlert():
-                yield ALERTS_OUT, self._alert(message)
+                self._alerts.take(message, now_mono_s)
+                yield ALERTS_OUT, self._told_alerts(now_mono_s, now_utc_s)
+            case ServerAlive():
+                self._alerts.alive(now_mono_s)
             case MapDelta() if topic in MAPS:
                 self._map(Topic(topic), message)
             case _:
                 pass
+
+    def turned(self, *, now_mono_s: float, now_utc_s: float) -> bytes | None:
+        """Alerts with what is stale, or is so no more, where the station has fallen silent or is back; see
+        ``is_silent``."""
+        return self._told_alerts(now_mono_s, now_utc_s) if self._alerts.turned(now_mono_s) else None
+
+    @property
+    def is_silent(self) -> bool:
+        return self._alerts.is_silent
+
+    def _told_alerts(self, now_mono_s: float, now_utc_s: float) -> bytes:
+        return self._messages.diagnostics(_ns(now_utc_s), self._alerts.statuses(now_mono_s))
 
     def _map(self, topic: Topic, delta: MapDelta) -> None:
         """Of a map that is not known from its beginning, or of which something was missed, nothing is told."""
@@ -133,22 +147,6 @@ class Outgoing:
             self._home = (home[0], home[1], home[2])
         east, north, _ = LocalFrame(*self._home).to_enu(lat_deg, lon_deg, self._home[2])[0].tolist()
         return np.array([east, north, up_m + home[2] - self._home[2]])
-
-    def _alert(self, alert: ObstacleAlert) -> bytes:
-        values = {"id": alert.id, "kind": alert.kind, "phase": alert.phase}
-        if (obstacle := alert.obstacle) is not None:
-            values |= {
-                "region": obstacle.region,
-                "distance_m": f"{obstacle.distance_m:.2f}",
-                "bearing_deg": f"{obstacle.bearing_deg:.1f}",
-                "height_difference_m": f"{obstacle.height_difference_m:.2f}",
-            }
-            if obstacle.time_to_contact_s is not None:
-                values["time_to_contact_s"] = f"{obstacle.time_to_contact_s:.2f}"
-            if obstacle.lat_deg is not None and obstacle.lon_deg is not None:
-                values |= {"lat_deg": f"{obstacle.lat_deg:.7f}", "lon_deg": f"{obstacle.lon_deg:.7f}"}
-        name, level = f"hedgehop: {alert.sensor}", LEVELS[alert.phase]
-        return self._messages.diagnostics(_ns(alert.t_utc_s), [(level, name, alert.text, alert.sensor, values)])
 
 
 def _attitude(state: VehicleState, t_s: float) -> F64 | None:

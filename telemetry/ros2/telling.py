@@ -6,18 +6,19 @@ import asyncio
 import contextlib
 import time
 from collections import Counter
+from collections.abc import Callable
 
 from telemetry.bus.bus import Bus
 from telemetry.bus.subscription import Subscription
 from telemetry.errors import BusError
 from telemetry.ros2 import grammar
-from telemetry.ros2.outgoing import MAPS, OUT_TOPICS, VOXELS_OUT, Outgoing, OutTopic
+from telemetry.ros2.outgoing import ALERTS_OUT, MAPS, OUT_TOPICS, VOXELS_OUT, Outgoing, OutTopic
 from telemetry.ros2.wire import Ros2Publisher, Ros2Wire
 from telemetry.topics.messages import Topic
 from telemetry.topics.requests import WholeMap
 
 NODE = "hedgehop"
-MAPS_EVERY_S, ASK_S = 1.0, 2.0
+MAPS_EVERY_S, ASK_S, LOOK_S = 1.0, 2.0, 0.5
 _DEPTH = 10
 
 
@@ -40,11 +41,16 @@ class _OwnTopic:
 class Ros2Teller:
     """``run`` until cancelled."""
 
-    def __init__(self, wire: Ros2Wire, *, domain: int, namespace: str = NODE, is_humble: bool = False) -> None:
-        """``is_humble``: humble's nodes know no hashes of types, and hear topics without one only."""
+    def __init__(
+        self, wire: Ros2Wire, *, domain: int, namespace: str = NODE, is_humble: bool = False,
+        tell: Callable[[str], None] = lambda _: None,
+    ) -> None:  # fmt: skip
+        """``is_humble``: humble's nodes know no hashes of types, and hear topics without one only; ``tell`` hears when
+        the station falls silent, and when it is back."""
+        self._said = tell
         self.counts = Counter[str]()
         """Messages by topic."""
-        self._outgoing = Outgoing()
+        self._outgoing = Outgoing(time.monotonic())
         wire.tell(grammar.node_token(domain, wire.session_id, NODE))
         self._topics = {
             out: _OwnTopic(wire, self._endpoint(out, number, wire.session_id, domain, namespace, is_humble))
@@ -60,17 +66,27 @@ class Ros2Teller:
 
     async def run(self, bus: Bus) -> None:
         async with asyncio.TaskGroup() as tasks:
-            for topic in (Topic.VEHICLE, Topic.ALERT):
+            for topic in (Topic.VEHICLE, Topic.SERVER, Topic.ALERT):
                 tasks.create_task(self._tell(bus.subscribe(topic, keep_all=topic == Topic.ALERT)))
             for topic in MAPS:
                 tasks.create_task(self._tell(bus.subscribe(topic, keep_all=True)))
             tasks.create_task(self._tell_maps(bus))
+            tasks.create_task(self._watch_station())
 
     async def _tell(self, heard: Subscription) -> None:
         async for topic, message in heard:
             found = self._outgoing.of(topic, message, now_mono_s=time.monotonic(), now_utc_s=time.time())
             for out, payload in found:
                 self._put(out, payload)
+
+    async def _watch_station(self) -> None:
+        while True:
+            await asyncio.sleep(LOOK_S)
+            payload = self._outgoing.turned(now_mono_s=time.monotonic(), now_utc_s=time.time())
+            if payload is not None:
+                self._put(ALERTS_OUT, payload)
+                gone = "The station is silent: alerts are told as STALE, and maps are as they were."
+                self._said(gone if self._outgoing.is_silent else "The station gives signs again.")
 
     async def _tell_maps(self, bus: Bus) -> None:
         """Whole maps, once a second where they changed: each is made in a thread."""

@@ -54,7 +54,7 @@ async def _run(
 ) -> dict[str, int]:
     wire = await asyncio.to_thread(Ros2Wire.open, address, changed=_on_router)
     try:
-        teller = Ros2Teller(wire, domain=reach.domain, namespace=namespace, is_humble=is_humble)
+        teller = Ros2Teller(wire, domain=reach.domain, namespace=namespace, is_humble=is_humble, tell=say)
         async with await Bus.open(folder, f"ros2-{os.getpid()}") as bus:
             names = ", ".join(f"/{namespace}/{out.name}" for out in OUT_TOPICS)
             say(f"Telling {address.endpoint}, domain {reach.domain}: {names}")
