@@ -7,6 +7,7 @@ orthophotos are written by worker processes (``store_terrain``, ``store_orthopho
 from __future__ import annotations
 
 import os
+import shutil
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -218,7 +219,10 @@ class Library:
         with storage_errors(folder):
             folder.mkdir(mode=0o700, exist_ok=True)
             for path in folder.iterdir():
-                path.unlink(missing_ok=True)
+                if path.is_dir() and not path.is_symlink():
+                    shutil.rmtree(path)
+                else:
+                    path.unlink(missing_ok=True)
         return folder
 
 

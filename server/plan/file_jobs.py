@@ -11,6 +11,7 @@ from server.errors import NotFoundError
 from server.library import Library
 from server.library.terrains import UNKNOWN_ORIGIN, Origin
 from server.plan import file_tasks
+from server.plan.archives import remove_upload
 from server.plan.on_show import OnShow
 from server.plan.plan_desk import PlanDesk
 from server.schemas import JobDoc, OrthophotoDoc, Pages, PlanDoc, TerrainDoc
@@ -60,7 +61,7 @@ class FileJobs:
             )
             await self._desk.propose(lambda document: _use_if_free(document, terrain))
 
-        return self._board.start(f"Reading {filename}", work, clean=lambda: upload.unlink(missing_ok=True))
+        return self._board.start(f"Reading {filename}", work, clean=lambda: remove_upload(upload))
 
     def add_orthophoto(self, upload: Path, filename: str, terrain_id: str) -> JobDoc:
         """Reads an uploaded orthomosaic and drapes it on its surface model."""

@@ -23,8 +23,9 @@ from server.library.fences import with_fence
 from server.library.orthophotos import store_orthophoto
 from server.library.shelf import read_manifest
 from server.library.terrains import Origin, TerrainManifest, load_terrain, spike_docs, store_terrain
+from server.plan import archives
 from server.plan.cloud_task import import_cloud
-from server.plan.tile_archive import is_archive, unpacked_tiles
+from server.plan.tile_archive import unpacked_tiles
 from server.schemas import OrthophotoDoc, PlanDoc, TerrainDoc
 from server.work.jobs import Progress
 
@@ -89,11 +90,11 @@ def import_terrain(
 @contextmanager
 def _unpacked(upload: Path, filename: str, report: Progress) -> Iterator[Path]:
     """What is read of an upload: itself, or a folder of the tiles in it."""
-    if not is_archive(upload):
+    if not archives.is_archive(upload):
         yield upload
         return
     report("Unpacking", None)
-    with unpacked_tiles(upload, filename) as folder:
+    with unpacked_tiles(upload, filename, report) as folder:
         yield folder
 
 

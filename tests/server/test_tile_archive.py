@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
+import shutil
 import struct
 import zipfile
 from pathlib import Path
@@ -10,10 +13,13 @@ import numpy as np
 import pytest
 
 from planning.errors import RasterError, RasterFormatError
+from server.errors import BadRequestError, JobCancelledError, TooLargeError
+from server.library import Library
 from server.library.terrains import FOLDER, UNKNOWN_ORIGIN, load_terrain
-from server.plan import tile_archive
+from server.plan import archives, tile_archive
 from server.plan.file_tasks import import_terrain
 from server.schemas import TerrainDoc
+from server.work.jobs import Lane
 from tests.planning.geotiff_samples import HALF_METRE, hill, write_raster
 
 
@@ -80,10 +86,10 @@ def test_what_cannot_be_unpacked_is_said(tmp_path: Path, tiles: Path, monkeypatc
     data = whole.read_bytes()
     for broken in (data[: len(data) // 2], data[:60] + b"\xff" * 40 + data[100:], _encrypted(data)):
         whole.write_bytes(broken)
-        with pytest.raises(RasterFormatError, match="unpacked"):
+        with pytest.raises(BadRequestError, match=r"^Etna.zip: The archive cannot be unpacked"):
             imported(tmp_path, whole)
     monkeypatch.setattr(tile_archive, "_MOST_BYTES", len(tile) - 1)
-    with pytest.raises(RasterError, match=r"^Etna.zip: Its tiles take .* there is room for"):
+    with pytest.raises(TooLargeError, match=r"^Etna.zip: Unpacked its files take .* there is room for"):
         imported(tmp_path, packed(tmp_path, {"a.tif": tile}))
     monkeypatch.setattr(tile_archive, "MOST_TILES", 1)
     with pytest.raises(RasterError, match=r"^Etna.zip: It has more than 1 tiles"):
@@ -97,9 +103,47 @@ def test_an_entry_that_says_less_than_it_holds_is_not_unpacked_beyond_it(tmp_pat
     at = data.index(b"PK\1\2")
     data[at + 24 : at + 28] = struct.pack("<I", 1000)
     upload.write_bytes(bytes(data))
-    with pytest.raises(RasterError):
+    with pytest.raises(BadRequestError, match="unpacked"):
         imported(tmp_path, upload)
     assert list(upload.parent.iterdir()) == [upload]
+
+
+def test_a_killed_worker_leaves_nothing_that_stays(tmp_path: Path) -> None:
+    """Neither after the job's own clearing up, nor after a start without one."""
+    library = Library(tmp_path / "data")
+    upload = library.new_upload(".zip")
+    with zipfile.ZipFile(upload, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        archive.writestr("a.tif", bytes(400_000_000))
+    asyncio.run(_killed(upload))
+    (left,) = [path for path in upload.parent.iterdir() if path.is_dir()]
+    again = shutil.copytree(left, left.with_name(f"{left.name}-again"))
+    others = upload.with_name("fedcba98.zip")
+    others.write_bytes(b"x")
+    archives.remove_upload(upload)
+    assert [path.exists() for path in (upload, left, again)] == [False, False, False]
+    assert others.exists()
+    shutil.copytree(tmp_path, left, ignore=shutil.ignore_patterns("data"))
+    library.close()
+    with contextlib.closing(Library(library.root)):
+        assert list((library.root / "uploads").iterdir()) == []
+
+
+async def _killed(upload: Path) -> None:
+    """A lane that is cancelled while its worker unpacks."""
+    lane = Lane("test")
+
+    def progress(step: str, share: float | None) -> None:
+        if step == "Unpacking" and share:
+            lane.cancel()
+
+    try:
+        with pytest.raises(JobCancelledError):
+            await lane.call(
+                import_terrain, upload.parent, upload, "Etna.zip", origin=UNKNOWN_ORIGIN, crs=None, z_scale=None,
+                vertical_datum=None, remove_spikes=False, cell_m=None, keep_noise=False, progress=progress,
+            )  # fmt: skip
+    finally:
+        await lane.close()
 
 
 def _encrypted(data: bytes) -> bytes:
