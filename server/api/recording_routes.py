@@ -21,6 +21,10 @@ class Recordings(RootModel[list[RecordingDoc]]):
     """Newest first."""
 
 
+class Bags(RootModel[list[BagDoc]]):
+    """Newest first."""
+
+
 @router.post("/recorder/start", **DONE)
 async def start(operator: InCharge, flying: Fly) -> None:
     """Records from now on, armed or not."""
@@ -77,6 +81,12 @@ async def play(body: PlayReview, fleet: All) -> None:
     await fleet.reviewing.play(body)
 
 
+@router.get("/bags", response_model=Bags)
+async def bags(fleet: All) -> Response:
+    """Those that are kept."""
+    return answer(Bags(fleet.bags.docs()))
+
+
 @router.post("/bags", response_model=BagDoc, openapi_extra=RAW_BODY)
 async def add_bag(request: Request, fleet: All, filename: FileName) -> Response:
     """A ``.bag`` of ROS 1, an ``.mcap`` or ``.db3`` of ROS 2, or a ZIP archive of a bag's folder; told by the content.
@@ -99,4 +109,5 @@ async def record_bag(bag_id: str, body: BagRecordingBody, fleet: All) -> Respons
 
 @router.delete("/bags/{bag_id}", **DONE)
 async def forget_bag(bag_id: str, fleet: All) -> None:
+    """409 while a recording is being made of it."""
     await fleet.bags.forget(bag_id)

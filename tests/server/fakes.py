@@ -234,6 +234,7 @@ class FakeFleet:
         self.flights = [self.first]
         self.uwb, self.checklists = self.first.uwb, Checklists(library.root)
         self.recordings = self.reviewing = self.first.recording
+        self.bags = SimpleNamespace(docs=list)
 
     @property
     def any_armed(self) -> bool:

@@ -14,7 +14,7 @@ import pytest
 
 from planning.errors import DescribedError
 from server.door import guard
-from server.errors import BadRequestError, NotFoundError, TooLargeError
+from server.errors import BadRequestError, InUseError, NotFoundError, TooLargeError
 from server.flying.bags import bag_task
 from server.flying.bags.bag_desk import MOST_KEPT, BagDesk
 from server.schemas import BagDoc, BagRecordingBody
@@ -22,7 +22,7 @@ from telemetry.errors import RecordingError
 from telemetry.recording.describe import describe_recording
 from telemetry.recording.flight_log import read_flight_log
 from tests.server.running import running
-from tests.telemetry.bags import write_bag
+from tests.telemetry.bags import T0_NS, Messages, write_bag
 from tests.telemetry.test_ros_bags import Flight
 
 
@@ -134,6 +134,56 @@ def test_only_the_newest_are_kept(tmp_path: Path, bags: dict[str, Path]) -> None
     asyncio.run(bag_desk.forget(docs[1].id))
 
 
+def test_a_bag_that_a_job_reads_is_not_put_away(tmp_path: Path, bags: dict[str, Path]) -> None:
+    asyncio.run(_kept_while_read(tmp_path, bags["ros1"]))
+
+
+async def _kept_while_read(tmp_path: Path, bag: Path) -> None:
+    bag_desk, docs = desk(tmp_path, []), []
+
+    async def bring(number: int) -> None:
+        upload = tmp_path / f"{number}.upload"
+        upload.write_bytes(bag.read_bytes())
+        docs.append(await bag_desk.add(upload, f"{number}.bag"))
+
+    for number in range(MOST_KEPT):
+        await bring(number)
+    begun, go_on = asyncio.Event(), asyncio.Event()
+
+    class Waiting(AtOnce):
+        async def run(self, label: str, work: Any) -> Any:
+            begun.set()
+            await go_on.wait()
+            return await work(self, None)
+
+    board = bag_desk._board
+    bag_desk._board = Waiting()  # type: ignore[assignment]
+    body = BagRecordingBody(points="/points", home_alt_amsl_m=432.0)
+    making = asyncio.ensure_future(bag_desk.record(docs[0].id, body))
+    await begun.wait()
+    bag_desk._board = board
+    with pytest.raises(InUseError, match=r"0\.bag is being made"):
+        await bag_desk.forget(docs[0].id)
+    await bring(MOST_KEPT)
+    assert [doc.name for doc in bag_desk.docs()] == ["2.bag", "0.bag"]  # the oldest that is idle had to go
+    assert (tmp_path / "0.upload").exists()
+    go_on.set()
+    with pytest.raises(InReviewError):
+        await making
+    await bag_desk.forget(docs[0].id)
+    assert not (tmp_path / "0.upload").exists()
+
+
+def test_fixes_that_have_no_fix_are_not_called_missing(tmp_path: Path) -> None:
+    m, kind = Messages("ros1"), "ros1"
+    entries = [entry for entry in Flight().entries(kind) if entry[0] != "/fix"]
+    none = [("/fix", T0_NS, m.fix(T0_NS, float("nan"), 10.0, 480.0))] * 3
+    bag_desk, doc, _ = added(tmp_path, write_bag(tmp_path, kind, [*none, *entries], name="none"), "none.bag")
+    with pytest.raises(RecordingError, match="none of its 3 NavSatFix has a fix") as refused:
+        asyncio.run(bag_desk.record(doc.id, BagRecordingBody(points="/points", home_alt_amsl_m=432.0)))
+    assert "latitude and longitude" in refused.value.advice
+
+
 def archive(*members: tuple[str, bytes]) -> bytes:
     data = io.BytesIO()
     with warnings.catch_warnings(), zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as packed:
@@ -198,3 +248,4 @@ def test_a_bag_of_more_than_what_json_may_be_is_taken(tmp_path: Path, bags: dict
         answer = server.http.post("/api/bags", params={"filename": "run.zip"}, content=data.getvalue(), headers=raw)
         assert answer.status_code == 200, answer.text
         assert answer.json()["topics"][0]["name"] == "/points"
+        assert server.http.get("/api/bags").json() == [answer.json()]

@@ -1,5 +1,6 @@
-import { describe, expect, it } from "vitest";
-import { isBag, startsAsBag } from "../src/store/bags";
+import { afterEach, describe, expect, it, vi } from "vitest";
+import type { BagDoc } from "../src/messages";
+import { bags, isBag, loadBags, putAway, startsAsBag } from "../src/store/bags";
 
 const bytes = (text: string): Uint8Array<ArrayBuffer> => Uint8Array.from(text, (char) => char.charCodeAt(0));
 
@@ -29,5 +30,38 @@ describe("a bag of ROS is told by how it begins", () => {
     expect(await isBag(new File([mcap("", "hedgehop 0.1.0")], "flight.mcap"))).toBe(false);
     expect(await isBag(new File(["x"], "flight.tlog"))).toBe(false);
     expect(await isBag(new File(["x"], "run.bag"))).toBe(true);
+  });
+});
+
+describe("bags that the station keeps", () => {
+  afterEach(() => {
+    vi.unstubAllGlobals();
+    bags.value = [];
+  });
+
+  it("are listed anew when a page is loaded, and stay listed until the station has put them away", async () => {
+    const bag = { id: "a1", name: "run.bag", topics: [], missing: [] } as unknown as BagDoc;
+    let kept = [bag];
+    const asked: string[] = [];
+    vi.stubGlobal("fetch", (path: string, { method }: RequestInit) => {
+      asked.push(`${method} ${path}`);
+      if (method === "DELETE" && asked.length > 3) kept = [];
+      else if (method === "DELETE")
+        return Promise.resolve(Response.json({ code: "in_use", what: "no" }, { status: 409 }));
+      return Promise.resolve(Response.json(method === "GET" ? kept : {}));
+    });
+    await loadBags();
+    expect(bags.value).toEqual([bag]);
+    await putAway(bag); // a recording is being made of it
+    expect(bags.value).toEqual([bag]);
+    await putAway(bag);
+    expect(bags.value).toEqual([]);
+    expect(asked).toEqual([
+      "GET /api/bags",
+      "DELETE /api/bags/a1",
+      "GET /api/bags",
+      "DELETE /api/bags/a1",
+      "GET /api/bags",
+    ]);
   });
 });

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import shutil
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from server.errors import BadRequestError, NotFoundError
+from server.errors import BadRequestError, InUseError, NotFoundError
 from server.flying.bags import bag_task
 from server.flying.recordings import RecordingDesk
 from server.library import Library
@@ -43,6 +44,8 @@ class BagDesk:
     def __init__(self, library: Library, board: JobBoard, recordings: RecordingDesk) -> None:
         self._library, self._board, self._recordings = library, board, recordings
         self._kept: dict[str, _Kept] = {}
+        self._read = Counter[str]()
+        """How many jobs read a bag, by its id: it stays as long."""
 
     async def add(self, upload: Path, name: str) -> BagDoc:
         """Lists an uploaded bag and keeps it. Raises RecordingError, BadRequestError, JobCancelledError."""
@@ -57,14 +60,18 @@ class BagDesk:
             raise
         doc = _doc(table, name, size)
         self._kept[doc.id] = _Kept(doc, upload, folder, bag, table)
-        while len(self._kept) > MOST_KEPT:
-            await self.forget(next(iter(self._kept)))
+        await self._forget_oldest()
         return doc
+
+    def docs(self) -> list[BagDoc]:
+        """Newest first."""
+        return [kept.doc for kept in reversed(self._kept.values())]
 
     async def record(self, bag_id: str, body: BagRecordingBody) -> BagRecordedDoc:
         """Raises NotFoundError, BadRequestError, RecordingError, JobCancelledError."""
         kept = self._of(bag_id)
         asked, out = _asked(body), self._library.new_upload(".mcap")
+        self._read[bag_id] += 1
         try:
             flight = await self._board.run(
                 f"Making a recording of {kept.doc.name}",
@@ -81,14 +88,26 @@ class BagDesk:
             )
             recording = await self._recordings.add(out, f"{Path(kept.doc.name).stem}.mcap")
         finally:
+            self._read[bag_id] -= 1
             await asyncio.to_thread(out.unlink, missing_ok=True)
+            await self._forget_oldest()
         return BagRecordedDoc(recording=recording, notes=list(flight.notes))
 
     async def forget(self, bag_id: str) -> None:
-        """Raises NotFoundError."""
+        """Raises NotFoundError, and InUseError while a recording is being made of it."""
         kept = self._of(bag_id)
+        if self._read[bag_id]:
+            what = f"A recording of {kept.doc.name} is being made."
+            raise InUseError(what, advice="Wait for it, or cancel it.")
+        del self._read[bag_id]
         del self._kept[bag_id]
         await asyncio.to_thread(_remove, kept.upload, kept.folder)
+
+    async def _forget_oldest(self) -> None:
+        """Down to as many as are kept; one that is read stays until it is not."""
+        idle = [bag_id for bag_id in self._kept if not self._read[bag_id]]
+        for bag_id in idle[: max(0, len(self._kept) - MOST_KEPT)]:
+            await self.forget(bag_id)
 
     def _of(self, bag_id: str) -> _Kept:
         if bag_id not in self._kept:

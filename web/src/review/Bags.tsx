@@ -1,7 +1,7 @@
-import { useState } from "preact/hooks";
+import { useEffect, useState } from "preact/hooks";
 import { bytes, count, duration, number } from "../format";
 import type { BagDoc, BagRecordingBody, BagTopicDoc } from "../messages";
-import { BAGS, bags, making, putAway, recordBag } from "../store/bags";
+import { BAGS, bags, loadBags, making, putAway, recordBag } from "../store/bags";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
 import { ErrorBox } from "../ui/Outcome";
@@ -201,6 +201,7 @@ function Bag({ bag }: { bag: BagDoc }) {
           class="small"
           icon="cross"
           title={`Put ${bag.name} away`}
+          disabled={making.value.has(bag.id)}
           testid="bag-away"
           onClick={() => void putAway(bag)}
         />
@@ -218,8 +219,9 @@ function Bag({ bag }: { bag: BagDoc }) {
   );
 }
 
-/** Bags of ROS that were dropped or chosen, until they are put away. */
+/** Bags of ROS that the station keeps, until they are put away. */
 export function Bags() {
+  useEffect(() => void loadBags(), []);
   if (bags.value.length === 0) return <ErrorBox place={BAGS} />;
   return (
     <Section id="bags" title="ROS bags" icon="folder" summary={count(bags.value.length, "bag")} startsOpen>

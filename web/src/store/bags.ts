@@ -11,7 +11,7 @@ export const BAGS = "bags";
 /** A long bag is read and judged as long as it takes; the job can be cancelled. */
 const LONGEST_MS = 30 * 60_000;
 
-/** Bags that this page brought in, newest first. */
+/** Bags that the station keeps, newest first. */
 export const bags = signal<readonly BagDoc[]>([]);
 /** Bags of which a recording is being made. */
 export const making = signal<ReadonlySet<string>>(new Set());
@@ -47,6 +47,16 @@ export async function sendBag(file: File): Promise<void> {
     const query = new URLSearchParams({ filename: file.name });
     const bag = JSON.parse(await sendFile(`/api/bags?${query}`, file)) as BagDoc;
     bags.value = [bag, ...bags.value];
+    await loadBags(); // an older one may have had to go
+  } catch (error) {
+    if (!isCancelled(error)) setError(BAGS, asErrorDoc(error));
+  }
+}
+
+/** What is kept from before this page was loaded can be used, and put away. */
+export async function loadBags(): Promise<void> {
+  try {
+    bags.value = await requestJson<BagDoc[]>("GET", "/api/bags");
   } catch (error) {
     if (!isCancelled(error)) setError(BAGS, asErrorDoc(error));
   }
@@ -76,6 +86,6 @@ export async function recordBag(bag: BagDoc, body: BagRecordingBody): Promise<vo
 }
 
 export async function putAway(bag: BagDoc): Promise<void> {
-  bags.value = bags.value.filter(({ id }) => id !== bag.id);
   await act("DELETE", `/api/bags/${bag.id}`, BAGS);
+  await loadBags();
 }
