@@ -143,6 +143,19 @@ def test_impossible_times_are_refused_and_told(t_s: float) -> None:
     assert intake.report(100.0).text == ""
 
 
+@pytest.mark.parametrize("column", range(5))
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_a_target_that_is_no_number_is_refused_and_told(column: int, value: float) -> None:
+    intake, targets = greeted(), TARGETS.copy()
+    targets[-1, column] = value
+    taken = give(intake, RadarMessage(1, 99.9, targets.tobytes()))
+    assert taken.frame is None
+    report = intake.report(100.0)
+    assert (report.refused, report.received) == (1, 0)
+    assert "no number" in report.text
+    assert give(intake, radar(2)).frame is not None
+
+
 @pytest.mark.parametrize("message", [RadarMessage(0, 99.0, b"123"), Cloud(0, 99.0, 0.2, 0.005, b"1"),
                                      Cloud(0, 99.0, 0.2, 0.0, b""), Cloud(0, 99.0, 0.2, 0.005, bytes(600_006)),
                                      RadarMessage(0, 99.0, bytes(20 * 1001))], ids=str)  # fmt: skip
