@@ -6,6 +6,9 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
+import numpy as np
+
+from mapping.geometry.arrays import F32
 from mapping.sensor_frames import CloudFrame, RadarFrame, SlamPose, UwbScan, packed
 from telemetry.agent import link_messages as wire
 from telemetry.errors import SensorLinkError
@@ -120,7 +123,7 @@ class Intake:
         if isinstance(message, wire.Uwb):
             return self._scan(message, now_mono_s, now_utc_s - age_s)
         if isinstance(message, wire.RadarMessage):
-            targets = wire.targets_of(message)
+            targets = self._whole(wire.targets_of(message))
             self._count(message)
             xyz_m, speed, snr = packed(targets[:, :3]), packed(targets[:, 3]), packed(targets[:, 4])
             return RadarFrame(message.t_s, now_utc_s - age_s, message.number, self.name, xyz_m, speed, snr)
@@ -128,6 +131,16 @@ class Intake:
         self._count(message)
         xyz_m = packed(points)
         return CloudFrame(message.t_s, now_utc_s - age_s, message.number, self.name, xyz_m, message.voxel_m)
+
+    def _whole(self, targets: F32) -> F32:
+        """Those that are numbers. Raises SensorLinkError where none is: that must not look like an empty air."""
+        whole = np.isfinite(targets).all(axis=1)
+        if missing := len(targets) - int(np.count_nonzero(whole)):
+            what = f"{missing:,} of {len(targets):,} targets hold what is no number."
+            if missing == len(targets):
+                raise SensorLinkError(what, where="radar", advice="Leave out what is not known.")
+            self._refuse(what)
+        return targets[whole]
 
     def _scan(self, message: wire.Uwb, now_mono_s: float, t_utc_s: float) -> UwbScan:
         intensity = packed(wire.intensity_of(message))

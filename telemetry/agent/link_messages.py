@@ -152,12 +152,8 @@ def points_of(message: Cloud) -> F32:
 
 
 def targets_of(message: RadarMessage) -> F32:
-    """(N, 5). Raises SensorLinkError for bytes that are no targets, or too many, and for what is no number."""
-    targets = _rows(message.targets, "<f4", TARGET_COLUMNS, TARGETS_MAX, "radar").astype(np.float32)
-    if not np.isfinite(targets).all():
-        advice = "Leave out targets whose place, speed or strength is not known."
-        raise SensorLinkError("A target's place, speed or strength is no number.", where="radar", advice=advice)
-    return targets
+    """(N, 5). Raises SensorLinkError for bytes that are no targets, or too many."""
+    return _rows(message.targets, "<f4", TARGET_COLUMNS, TARGETS_MAX, "radar").astype(np.float32)
 
 
 def intensity_of(message: Uwb) -> F32:

@@ -149,10 +149,14 @@ def test_a_target_that_is_no_number_is_refused_and_told(column: int, value: floa
     intake, targets = greeted(), TARGETS.copy()
     targets[-1, column] = value
     taken = give(intake, RadarMessage(1, 99.9, targets.tobytes()))
-    assert taken.frame is None
+    assert isinstance(taken.frame, RadarFrame)
+    assert rows(taken.frame.xyz_m, 3) == pytest.approx(TARGETS[:1, :3])
     report = intake.report(100.0)
-    assert (report.refused, report.received) == (1, 0)
-    assert "no number" in report.text
+    assert (report.refused, report.received) == (1, 1)
+    assert "1 of 2 targets hold what is no number" in report.text
+    targets[:, column] = value
+    assert give(intake, RadarMessage(1, 99.9, targets.tobytes())).frame is None  # it would look like an empty air
+    assert intake.report(100.0).refused == 2
     assert give(intake, radar(2)).frame is not None
 
 
