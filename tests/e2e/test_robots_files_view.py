@@ -18,7 +18,7 @@ def test_a_cloud_without_a_system_asks_for_it_and_becomes_a_model(station: Stati
     xyz, classes = some_points(1)
     visit(page, station)
     choose(page, page.get_by_test_id("terrain-file"), write_las(tmp_path / "survey.laz", xyz, classes, crs=None))
-    failed = page.get_by_test_id("failed-job")
+    failed = page.get_by_test_id("failed-job").filter(has_text="survey.laz")
     expect(failed.get_by_test_id("error-box")).to_contain_text("no coordinate reference system")
     failed.get_by_test_id("raster-crs").fill("EPSG:32633")
     failed.get_by_test_id("cloud-cell").fill("0.25")

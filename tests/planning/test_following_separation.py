@@ -31,7 +31,7 @@ def slowly(a: TimedLine, b: TimedLine, every_s: float = 0.1) -> float:
         for t_b in np.arange(b.t_s[0], b.t_s[-1] + 1e-9, every_s):
             gone_a, gone_b = t_a - a.t_s[0], t_b - b.t_s[0]
             span_s = a.early_late_s + a.early_late_share * gone_a + b.early_late_s + b.early_late_share * gone_b
-            if abs(t_a - t_b) <= span_s + 1e-9:
+            if abs(t_a - t_b) <= span_s:
                 apart_m = math.dist(_at(a, t_a), _at(b, t_b))
                 radii_m = a.radius_m + a.spread_m_s * gone_a + b.radius_m + b.spread_m_s * gone_b
                 least_m = min(least_m, max(0.0, apart_m - radii_m))

@@ -86,7 +86,6 @@ function HintForm({ name, hints, made_m, onSubmit, onLeave }: FormProps) {
             <span>Cell, m</span>
             <input
               type="number"
-              min={0.01}
               step="any"
               placeholder={made_m ? `${made_m} by density` : "by density"}
               value={draft.cell_m}
