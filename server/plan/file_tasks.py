@@ -29,7 +29,7 @@ from server.plan.tile_archive import unpacked_tiles
 from server.schemas import OrthophotoDoc, PlanDoc, TerrainDoc
 from server.work.jobs import Progress
 
-_STAGES = {"decode": "Reading", "resample": "Resampling", "spikes": "Looking for spikes"}
+_STAGES = {"digest": "Reading", "decode": "Reading", "resample": "Resampling", "spikes": "Looking for spikes"}
 
 
 @contextmanager

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.server
+import os
 import re
+import struct
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
@@ -16,7 +20,8 @@ import pytest
 from planning.errors import ParameterError, RasterError, RasterFormatError
 from planning.terrain.geotiff import open_dsm, read_dsm
 from planning.terrain.rasters import dsm_file
-from planning.terrain.rasters.ranges import RemoteFile, is_address
+from planning.terrain.rasters.byte_pipe import Served, served
+from planning.terrain.rasters.ranges import Look, RemoteFile, is_address
 from tests.planning.geotiff_samples import hill, write_raster
 
 
@@ -30,6 +35,7 @@ class Ranges(http.server.BaseHTTPRequestHandler):
         self.server.asked.append((self.path, self.headers.get("Range", "")))
         data, fault = self.server.files.get(self.path), self.server.fault
         if fault == "silent":
+            self.server.reached.set()
             self.server.released.wait(20)
             return
         if fault == "hangs up":
@@ -37,6 +43,8 @@ class Ranges(http.server.BaseHTTPRequestHandler):
             return
         if fault == "redirect":
             self._answer(302, b"", {"Location": f"http://127.0.0.1:{self.server.server_port}/secret.tif"})
+        elif fault == "drips":
+            self._drip()
         elif data is None:
             self._answer(404, b"")
         elif fault == "no ranges":
@@ -44,11 +52,24 @@ class Ranges(http.server.BaseHTTPRequestHandler):
         else:
             self._part(data, fault)
 
+    def _drip(self) -> None:
+        """An answer that never ends, of which some comes ever again."""
+        self.close_connection = True
+        with contextlib.suppress(OSError):
+            self.wfile.write(b"HTTP/1.1 206 Partial Content\r\nX: ")
+            while not self.server.released.wait(0.02):
+                self.wfile.write(b"x")
+
     def _part(self, data: bytes, fault: str) -> None:
         first, last = map(int, re.findall(r"\d+", self.headers["Range"]))
-        whole = {"Content-Range": f"bytes {first}-{last}/{len(data)}", "ETag": f'"{self.server.version}"'}
+        whole = {
+            "Content-Range": f"bytes {first}-{last}/{len(data)}",
+            "ETag": self.server.tag or f'"{self.server.version}"',
+        }
         if fault == "no version":
             del whole["ETag"]
+        if self.server.written:
+            whole["Last-Modified"] = self.server.written
         shifted = 1 if fault == "other bytes" and first else 0
         self._answer(206, data[first + shifted : last + 1], whole)
 
@@ -70,8 +91,8 @@ class Server(http.server.ThreadingHTTPServer):
         super().__init__(("127.0.0.1", 0), Ranges)
         self.files: dict[str, bytes] = {}
         self.asked: list[tuple[str, str]] = []
-        self.fault, self.version = "", 1
-        self.released = threading.Event()
+        self.fault, self.version, self.tag, self.written = "", 1, "", ""
+        self.released, self.reached = threading.Event(), threading.Event()
 
     @property
     def address(self) -> str:
@@ -158,7 +179,8 @@ def test_nothing_else_is_asked_for(server: Server, address: str) -> None:
     [
         ("redirect", "leads elsewhere"),
         ("no ranges", "does not answer with parts"),
-        ("no version", "neither ETag nor Last-Modified"),
+        ("no version", "neither a strong ETag nor Last-Modified"),
+        ("drips", "too slow: 0.4 s"),
         ("hangs up", "cannot be read from"),
         ("silent", "nothing for 0.2 s"),
     ],
@@ -166,7 +188,7 @@ def test_nothing_else_is_asked_for(server: Server, address: str) -> None:
 def test_what_a_server_does_wrong_is_said(server: Server, fault: str, words: str) -> None:
     server.fault = fault
     with pytest.raises(RasterError, match=words):
-        remote(server, timeout_s=0.2)
+        remote(server, timeout_s=0.2, request_s=0.4)
     assert all(path == "/dsm/model.tif" for path, _ in server.asked)
 
 
@@ -197,3 +219,67 @@ def test_a_missing_file_and_another_kind_are_said(server: Server) -> None:
 def test_a_path_that_was_an_address_is_one() -> None:
     assert is_address(Path("https://maps.example/dsm/a.tif"))
     assert not is_address(Path("httpd/a.tif"))
+
+
+@pytest.mark.parametrize("place", [0.3, 0.6, 1.0])
+def test_no_read_may_fail_unnoticed(
+    server: Server, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: float
+) -> None:
+    """Decoders do without tags that they cannot read: such as scale and offset."""
+    path = write_raster(tmp_path / "scaled.tif", hill(), scale=(2.0, 30.0), nodata=-9999.0)
+    server.files["/dsm/scaled.tif"] = path.read_bytes()
+    real, count, failing = RemoteFile.read, 0, 0
+
+    def read(file: RemoteFile, offset: int, length: int, **how: Any) -> bytes:
+        nonlocal count
+        count += 1
+        if count == failing:
+            raise RasterError("The line was lost.")
+        return real(file, offset, length, **how)
+
+    monkeypatch.setattr(RemoteFile, "read", read)
+    with closing(remote(server, "/dsm/scaled.tif")) as file:
+        open_dsm(file)
+    count, failing = 0, round(place * count)
+    with closing(remote(server, "/dsm/scaled.tif")) as file, pytest.raises(RasterError, match="line was lost"):
+        open_dsm(file)
+    assert failing > 0
+
+
+def test_whoever_is_interrupted_waits_for_no_server(server: Server) -> None:
+    file = remote(server, timeout_s=30.0)
+    look, server.fault = Look(file), "silent"
+    began = time.monotonic()
+    ends: list[Served] = []
+
+    def interrupted() -> None:
+        with served(look.read, look.stop) as end:
+            ends.append(end)
+            os.write(end.child[1], struct.pack(">QQ", 0, 4))
+            assert server.reached.wait(20)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert time.monotonic() - began < 10.0
+    assert "stopped" in str(ends[0].error)
+    with pytest.raises(RasterError, match="stopped"):
+        look.read(0, 4)
+    server.fault = ""
+    assert file.read(0, 4) == server.files["/dsm/model.tif"][:4]
+    file.close()
+
+
+def test_a_version_that_may_hide_a_change_is_said(server: Server) -> None:
+    server.tag = 'W/"1"'
+    with pytest.raises(RasterError, match="neither a strong ETag"):
+        remote(server)
+    server.written = "Wed, 21 Oct 2026 07:28:00 GMT"
+    with closing(remote(server)) as file:
+        assert any("same second" in text for text in open_dsm(file).warnings)
+        assert "to the second" in file.identified_by
+    server.tag = ""
+    with closing(remote(server)) as file:
+        assert not any("same second" in text for text in open_dsm(file).warnings)
+        assert "ETag" in file.identified_by
+        assert file._connection is None

@@ -5,6 +5,7 @@ A question is offset and count, an answer a count and so many bytes; a count bel
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import struct
@@ -29,8 +30,11 @@ class Served:
 
 
 @contextmanager
-def served(read: Callable[[int, int], bytes]) -> Iterator[Served]:
-    """Answers questions by ``read(offset, count)`` from a thread, until the child has closed its ends."""
+def served(read: Callable[[int, int], bytes], stop: Callable[[], None]) -> Iterator[Served]:
+    """Answers questions by ``read(offset, count)`` from a thread, until the child has closed its ends.
+
+    ``stop`` ends a read that is under way, and lets no other begin: it is called when this ends by an error.
+    """
     questions, asks = os.pipe()
     hears, answers = os.pipe()
     end = Served((hears, asks))
@@ -38,6 +42,9 @@ def served(read: Callable[[int, int], bytes]) -> Iterator[Served]:
     thread.start()
     try:
         yield end
+    except BaseException:
+        stop()
+        raise
     finally:
         for handle in end.child:
             os.close(handle)
@@ -45,18 +52,18 @@ def served(read: Callable[[int, int], bytes]) -> Iterator[Served]:
 
 
 def _answer(questions: int, answers: int, read: Callable[[int, int], bytes], end: Served) -> None:
-    with os.fdopen(questions, "rb") as asked, os.fdopen(answers, "wb") as out:
+    # A child that has ended reads no answer.
+    with contextlib.suppress(BrokenPipeError), os.fdopen(questions, "rb") as asked, os.fdopen(answers, "wb") as out:
         while len(question := asked.read(_QUESTION.size)) == _QUESTION.size:
             try:
                 data = read(*_QUESTION.unpack(question))
                 count = len(data)
             except RasterError as error:
-                end.error, data, count = error, b"", _FAILED
-            try:
-                out.write(_COUNT.pack(count) + data)
-                out.flush()
-            except BrokenPipeError:
-                break  # the child has ended
+                end.error, data, count = end.error or error, b"", _FAILED
+            except Exception as error:  # the child must not wait for an answer that never comes
+                end.error, data, count = RasterError(f"Its bytes cannot be had ({error!r})."), b"", _FAILED
+            out.write(_COUNT.pack(count) + data)
+            out.flush()
 
 
 class Asking:
@@ -64,16 +71,24 @@ class Asking:
 
     def __init__(self, hears: int, asks: int) -> None:
         self._in, self._out = os.fdopen(hears, "rb"), os.fdopen(asks, "wb")
+        self._failed = False
 
     def bytes_at(self, offset: int, count: int) -> bytes:
-        """One to ``count`` bytes. Raises OSError where the parent cannot have them."""
+        """One to ``count`` bytes. Raises OSError where the parent cannot have them, and from then on."""
+        self.check()
         self._out.write(_QUESTION.pack(offset, count))
         self._out.flush()
         head = self._in.read(_COUNT.size)
         found = _COUNT.unpack(head)[0] if len(head) == _COUNT.size else _FAILED
-        if not 0 < found <= count:
+        data = self._in.read(found) if 0 < found <= count else b""
+        self._failed = not data or len(data) != found
+        self.check()
+        return data
+
+    def check(self) -> None:
+        """OSError when any bytes were not had: decoders do without what is not vital to them."""
+        if self._failed:
             raise OSError("the bytes cannot be had")
-        return self._in.read(found)
 
 
 class PipeFile(io.RawIOBase):

@@ -6,9 +6,11 @@ below a prefix that the operator of the machine allowed. Redirects are not follo
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import http.client
 import re
+import socket
 import threading
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -18,6 +20,12 @@ from planning.errors import ParameterError, RasterError, RasterFormatError, Rast
 
 TIMEOUT_S = 10.0
 """To connect, and for each piece of an answer."""
+REQUEST_S = 60.0
+"""For a whole answer, of 8 MiB at most: a server that drips is given up."""
+WEAK_WORDS = (
+    "The server tells no strong ETag, only when the file was written (Last-Modified): "
+    "a change within the same second that keeps its size is not noticed."
+)
 _BLOCK_BYTES = 2**18
 _KEPT_BLOCKS = 256
 _MOST_BLOCKS = 32
@@ -38,7 +46,9 @@ def is_address(source: object) -> bool:
 class RemoteFile:
     """One file on a server. Raises RasterError, in words, for whatever keeps it from being read."""
 
-    def __init__(self, address: str, allowed: Sequence[str], *, timeout_s: float = TIMEOUT_S) -> None:
+    def __init__(
+        self, address: str, allowed: Sequence[str], *, timeout_s: float = TIMEOUT_S, request_s: float = REQUEST_S
+    ) -> None:
         whole = re.sub(r"^(https?):/+", r"\1://", address, flags=re.IGNORECASE)
         self._parts = _checked(whole, what="address")
         if not any(_is_below(self._parts, _checked(prefix, what="allowed prefix")) for prefix in allowed):
@@ -49,11 +59,15 @@ class RemoteFile:
                 f'dsm_urls = ["{self._parts.scheme}://{self._parts.netloc}/"]',
             )
         self.name = self._parts.path.rpartition("/")[2] or self._parts.netloc
-        self._timeout_s = timeout_s
+        self._timeout_s, self._request_s = timeout_s, request_s
+        self._late = False
         self._lock = threading.Lock()
+        self._stopped: threading.Event | None = None
         self._connection: http.client.HTTPConnection | None = None
         self._blocks: OrderedDict[int, bytes] = OrderedDict()
         self._version = ""
+        self.is_strong = False
+        """Whether every change is noticed: the server tells a strong ETag."""
         self.size_bytes = 0
         try:
             self._look()
@@ -66,12 +80,19 @@ class RemoteFile:
         """Of address, size and the version that the server tells: the content is never read as a whole."""
         return hashlib.sha256(f"{self._parts.geturl()}\n{self.size_bytes}\n{self._version}".encode()).hexdigest()
 
-    def read(self, offset: int, count: int) -> bytes:
-        """At most ``count`` bytes from ``offset`` on, fewer at the end of the file."""
+    @property
+    def identified_by(self) -> str:
+        """What its SHA-256 is of, in words."""
+        version = "ETag" if self.is_strong else "Last-Modified, to the second"
+        return f"address, size and version ({version}); the content was not read as a whole"
+
+    def read(self, offset: int, count: int, *, stopped: threading.Event | None = None) -> bytes:
+        """At most ``count`` bytes from ``offset`` on, fewer at the end of the file; an error once ``stopped``."""
         end = min(offset + min(count, _MOST_BYTES), self.size_bytes)
         if not 0 <= offset < end:
             return b""
         with self._lock:
+            self._stopped = stopped
             first, last = offset // _BLOCK_BYTES, (end - 1) // _BLOCK_BYTES
             data = b"".join(self._block(number, last) for number in range(first, last + 1))
         return data[offset - first * _BLOCK_BYTES : end - first * _BLOCK_BYTES]
@@ -80,6 +101,14 @@ class RemoteFile:
         if self._connection is not None:
             self._connection.close()
             self._connection = None
+
+    def abort(self) -> None:
+        """Ends, from another thread, the request that is under way."""
+        connection = self._connection
+        if connection is not None and (sock := connection.sock) is not None:
+            with contextlib.suppress(OSError):
+                # The plain one: that of TLS would take the state from under its reader.
+                socket.socket.shutdown(sock, socket.SHUT_RDWR)
 
     def _block(self, number: int, last: int) -> bytes:
         """A block, read with those after it that will be needed and are not here."""
@@ -103,12 +132,12 @@ class RemoteFile:
         with self._lock:
             answer, _ = self._asked(0, 1)
             found = re.fullmatch(r"bytes 0-0/(\d+)", answer.getheader("Content-Range", ""))
-            self._version = _version(answer)
+            self._version, self.is_strong = _version(answer), _strong(answer) != ""
         if answer.status != http.client.PARTIAL_CONTENT or found is None:
             raise self._fault("does not answer with parts of a file (HTTP ranges)", "Serve it by a server that does.")
         if not self._version:
             raise self._fault(
-                "tells neither ETag nor Last-Modified: nobody would notice that the file was changed",
+                "tells neither a strong ETag nor Last-Modified: nobody would notice that the file was changed",
                 "Serve it by a server that does.",
             )
         self.size_bytes = int(found[1])
@@ -130,18 +159,54 @@ class RemoteFile:
                 return self._request(begin, end)
             except (http.client.HTTPException, OSError) as error:
                 self.close()
-                if tried + 1 == _TRIES or isinstance(error, TimeoutError):
-                    words = f"nothing for {self._timeout_s:g} s" if isinstance(error, TimeoutError) else str(error)
+                if tried + 1 == _TRIES or self._late or self._is_stopped or isinstance(error, TimeoutError):
                     raise self._fault(
-                        f"cannot be read from ({words or type(error).__name__})", "Check server and network, try again."
+                        f"cannot be read from ({self._why(error)})", "Check server and network, try again."
                     ) from error
         raise AssertionError("every try returns or raises")
 
+    @property
+    def _is_stopped(self) -> bool:
+        return self._stopped is not None and self._stopped.is_set()
+
+    def _why(self, error: Exception) -> str:
+        if self._is_stopped:
+            return "it was stopped"
+        if self._late:
+            return f"too slow: {self._request_s:g} s were not enough for one answer"
+        if isinstance(error, TimeoutError):
+            return f"nothing for {self._timeout_s:g} s"
+        return str(error) or type(error).__name__
+
     def _request(self, begin: int, end: int) -> tuple[http.client.HTTPResponse, bytes]:
+        """One request within its time: each piece of an answer alone may come in time for ever."""
+        self._late = False
+        clock = threading.Timer(self._request_s, self._expire)
+        clock.daemon = True
+        clock.start()
+        try:
+            answer, data = self._answered(begin, end)
+        finally:
+            clock.cancel()
+            clock.join()
+        if self._late or self._is_stopped:  # what came is cut short
+            self.close()
+            raise ConnectionAbortedError
+        return answer, data
+
+    def _expire(self) -> None:
+        self._late = True
+        self.abort()
+
+    def _answered(self, begin: int, end: int) -> tuple[http.client.HTTPResponse, bytes]:
         if self._connection is None:
             kind = http.client.HTTPSConnection if self._parts.scheme == "https" else http.client.HTTPConnection
             self._connection = kind(self._parts.hostname or "", _port(self._parts), timeout=self._timeout_s)
         headers = {"Range": f"bytes={begin}-{end - 1}", "Accept-Encoding": "identity"}
+        if self._connection.sock is None:
+            self._connection.connect()
+        if self._late or self._is_stopped:  # it came before there was a connection to end
+            raise ConnectionAbortedError
         self._connection.request("GET", self._parts.path, headers=headers)
         answer = self._connection.getresponse()
         if answer.status in (http.client.OK, http.client.PARTIAL_CONTENT):
@@ -158,8 +223,29 @@ class RemoteFile:
         return RasterError(f"The server {self._parts.netloc} {what}.", where=self.name, advice=advice)
 
 
+class Look:
+    """The reads of one look into a file, which another thread may stop."""
+
+    def __init__(self, file: RemoteFile) -> None:
+        self._file, self._stopped = file, threading.Event()
+
+    def read(self, offset: int, count: int) -> bytes:
+        return self._file.read(offset, count, stopped=self._stopped)
+
+    def stop(self) -> None:
+        """Ends the read that is under way; no other begins."""
+        self._stopped.set()
+        self._file.abort()
+
+
 def _version(answer: http.client.HTTPResponse) -> str:
-    return answer.getheader("ETag") or answer.getheader("Last-Modified") or ""
+    return _strong(answer) or answer.getheader("Last-Modified") or ""
+
+
+def _strong(answer: http.client.HTTPResponse) -> str:
+    """The ETag, unless it is weak: such a one may stay while bytes change."""
+    tag = answer.getheader("ETag", "")
+    return "" if tag.startswith(("W/", "w/")) else tag
 
 
 def _checked(address: str, *, what: str) -> SplitResult:

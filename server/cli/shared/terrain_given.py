@@ -26,7 +26,7 @@ class OpenedModel:
 
     model: SurfaceModel
     made: dict[str, object]
-    """What was done to its heights, for the certificate's assumptions."""
+    """What was done to its heights, and what its SHA-256 is of, for the certificate's assumptions."""
     spikes_told: bool
 
     def say_spikes(self, part: Dsm) -> None:
@@ -47,7 +47,8 @@ def open_model(path: Path, timer: StepTimer, options: ModelOptions) -> OpenedMod
     say_notes(*model.warnings)
     if model.report is not None:
         _say_spikes(find_spikes(model.whole()), removed=False)
-    return OpenedModel(model, {}, spikes_told=model.report is not None)
+    made: dict[str, object] = {"model_sha256_of": source.identified_by} if isinstance(source, RemoteFile) else {}
+    return OpenedModel(model, made, spikes_told=model.report is not None)
 
 
 def read_around(path: Path, timer: StepTimer, options: ModelOptions, places: Callable[[SurfaceModel], F64]) -> Dsm:
