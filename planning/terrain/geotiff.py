@@ -147,7 +147,7 @@ def _declared(how: ReadOptions) -> Declared:
 def _read(path: str | os.PathLike[str], how: ReadOptions) -> tuple[Dsm, ReadReport]:
     source = Path(path)
     progress = watched(how.get("progress"), where=source.name)
-    read = read_surface(source, _declared(how), all_of, first_look=True, progress=progress)
+    read = read_surface(source, _declared(how), all_of, first=None, progress=progress)
     assert read.stored is not None
     return assemble(read.stored, read.plan, read.stats, sha256=read.sha256, where=source.name, progress=progress)
 

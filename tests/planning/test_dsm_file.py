@@ -87,7 +87,7 @@ def reads(files: dict[str, Path]) -> dict[str, tuple[Dsm, Read]]:
     """Each model as a whole, and its numbers in metres."""
     found = {}
     for kind, path in files.items():
-        read = read_surface(path, Declared(None, None, None, RasterLimits()), all_of, first_look=True)
+        read = read_surface(path, Declared(None, None, None, RasterLimits()), all_of, first=None)
         assert read.stored is not None
         mask_and_scale(read.stored, sentinels=(), scale=read.plan.height_scale, offset=read.plan.height_offset)
         found[kind] = read_dsm(path), read

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from itertools import islice, pairwise
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -16,7 +17,8 @@ from rasterio.errors import NotGeoreferencedWarning
 from rasterio.windows import Window
 
 from mapping.geometry.arrays import F32
-from planning.terrain.rasters.dataset import DATUM_TAG, Grid, header_of, opened_grid
+from planning.terrain.rasters.dataset import Grid, header_of, opened_grid
+from planning.terrain.rasters.header import DATUM_TAG
 from planning.terrain.rasters.heights import HeightStats
 
 Json = dict[str, Any]
@@ -24,9 +26,9 @@ Send = Callable[..., None]
 Ask = Callable[[Json], Json]
 
 _PART_PX = 4_000_000
-_SAMPLE_BLOCKS, _SAMPLE_TRIES = 49, 20_000
-_GOLDEN = 0.6180339887498949
-"""Its multiples, their whole parts cut off, lie evenly between 0 and 1."""
+_SAMPLE_BLOCKS = 49
+_SEARCH = 8
+"""As many times a sample is looked through where nothing of it is known."""
 # A file's own georeference is judged by the parent, in its own words.
 warnings.simplefilter("ignore", NotGeoreferencedWarning)
 
@@ -35,14 +37,14 @@ def read_grid(job: Json, send: Send, ask: Ask) -> None:
     """Band 1 as raw float32 rows in ``job["target"]``, NaN where the file says unknown.
 
     What is asked for: "pixels", [first row, first column, rows, columns], or null for none; the file's "digest"; the
-    statistics of a "sample" of it.
+    statistics of a "sample" of it. At the first look of a mosaic its "layout" comes back.
     """
     with opened_grid(job) as grid:
         order = ask(grid.header.as_json())
-        digest = grid.digest() if order["digest"] else ""
-        sample, stats = HeightStats(), HeightStats()
-        for window in _sample(grid) if order["sample"] else ():
-            sample.add(grid.heights(window))
+        told = partial(send, "progress", stage="digest")
+        digest = grid.digest(lambda share: told(share=share)) if order["digest"] else ""
+        layout = grid.layout() if order["digest"] else None
+        sample, stats = _sample(grid) if order["sample"] else HeightStats(), HeightStats()
         if order["pixels"] is not None:
             row0, column0, rows, columns = order["pixels"]
             with Path(job["target"]).open("wb") as target:
@@ -50,7 +52,7 @@ def read_grid(job: Json, send: Send, ask: Ask) -> None:
                     heights = stats.add(grid.heights(window))
                     _place(target, heights, window.row_off - row0, window.col_off - column0, columns)
                     send("progress", stage="decode", share=(window.row_off - row0 + window.height) / rows)
-    send("done", sha256=digest, stats=stats.as_json(), sample=sample.as_json())
+    send("done", sha256=digest, stats=stats.as_json(), sample=sample.as_json(), layout=layout)
 
 
 def read_picture(job: Json, send: Send, ask: Ask) -> None:
@@ -126,21 +128,16 @@ def _cuts(first: int, count: int, step: int, block: int) -> list[int]:
     return [first, *inner, first + count]
 
 
-def _sample(grid: Grid) -> list[Window]:
-    """Blocks spread evenly over what was written of the raster."""
-    (height, width), header = grid.block, grid.header
-    down, across = -(-header.height_px // height), -(-header.width_px // width)
-    count = min(_SAMPLE_BLOCKS, max(1, _PART_PX // (height * width)))
-    numbers = dict.fromkeys(int(k * _GOLDEN % 1.0 * down * across) for k in range(_SAMPLE_TRIES))
-    blocks = [_block(grid, number // across, number % across) for number in numbers]
-    written = list(islice(filter(grid.holds, blocks), count))
-    return sorted(written or blocks[:count], key=lambda window: (window.row_off, window.col_off))
-
-
-def _block(grid: Grid, down: int, across: int) -> Window:
-    (height, width), header = grid.block, grid.header
-    top, left = down * height, across * width
-    return Window(left, top, min(width, header.width_px - left), min(height, header.height_px - top))  # pyright: ignore[reportCallIssue]
+def _sample(grid: Grid) -> HeightStats:
+    """Of blocks spread evenly over what was written of the raster; of more where these are unknown."""
+    found, pixels = HeightStats(), 0
+    for count, window in enumerate(grid.blocks(), start=1):
+        found.add(grid.heights(window))
+        pixels += window.width * window.height
+        times = 1 if found.known or found.sentinels else _SEARCH
+        if count >= _SAMPLE_BLOCKS * times or pixels >= _PART_PX * times:
+            break
+    return found
 
 
 def _place(target: BinaryIO, part: F32, row: int, column: int, width: int) -> None:

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from planning.errors import ParameterError, RasterError, RasterFormatError
+from planning.errors import ParameterError, RasterFormatError
 from planning.terrain.dsm import LARGE_PX, Dsm, SurfaceModel
 from planning.terrain.rasters.assemble import ReadReport, assemble
 from planning.terrain.rasters.header import RasterHeader
 from planning.terrain.rasters.heights import doubts, mask_and_scale
 from planning.terrain.rasters.part_of import model_grid, needed_pixels, part_of
-from planning.terrain.rasters.ranges import RemoteFile
-from planning.terrain.rasters.reading import Declared, Pixels, Progress, Read, all_of, files_identity, read_surface
+from planning.terrain.rasters.ranges import WEAK_WORDS, RemoteFile
+from planning.terrain.rasters.reading import Declared, Pixels, Progress, Read, all_of, read_surface
 
 AHEAD_PX = 256
 """Decoded around what is asked for: the next question is mostly about a little more."""
@@ -29,11 +29,10 @@ class DsmFile(SurfaceModel):
 
     def __init__(self, source: Path | RemoteFile, declared: Declared, progress: Progress | None = None) -> None:
         self._source, self._declared, self._progress = source, declared, progress
-        self._identity = files_identity(source, virtual=declared.virtual)
         self.name = source.name
         self._kept: tuple[Pixels, np.ndarray] | None = None
         self._whole: Dsm | None = None
-        self._first = read_surface(source, declared, _all_if_small, first_look=True, progress=progress)
+        self._first = read_surface(source, declared, _all_if_small, first=None, progress=progress)
         plan = self._first.plan
         self.transform, self._shape = model_grid(plan)
         self.crs, self.vertical_datum, self.sha256 = plan.crs, plan.reference.vertical_datum, self._first.sha256
@@ -124,14 +123,9 @@ class DsmFile(SurfaceModel):
             )
 
     def _look(self, wanted: Pixels) -> Read:
-        read = read_surface(
-            self._source, self._declared, lambda header: wanted, first_look=False, progress=self._progress
+        return read_surface(
+            self._source, self._declared, lambda header: wanted, first=self._first, progress=self._progress
         )
-        if files_identity(self._source, virtual=self._declared.virtual) != self._identity:
-            raise RasterError(
-                "The file was changed while it was being read.", where=self._source.name, advice="Start again."
-            )
-        return read
 
     def _assemble(self, read: Read) -> None:
         assert read.stored is not None
@@ -148,4 +142,5 @@ def _all_if_small(header: RasterHeader) -> Pixels | None:
 def _of_remote(source: Path | RemoteFile) -> tuple[str, ...]:
     if isinstance(source, Path):
         return ()
-    return ("The model's SHA-256 is that of its address, size and version: it was not read as a whole.",)
+    notes = ("The model's SHA-256 is that of its address, size and version: it was not read as a whole.",)
+    return notes if source.is_strong else (*notes, WEAK_WORDS)

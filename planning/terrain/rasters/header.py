@@ -9,6 +9,9 @@ from affine import Affine
 
 from planning.errors import RasterFormatError, RasterTooLargeError
 
+DATUM_TAG = "HEDGEHOP_VERTICAL_DATUM"
+"""The tag that ``write_dsm`` leaves."""
+
 
 @dataclass(frozen=True, slots=True)
 class RasterLimits:
@@ -51,7 +54,7 @@ class RasterHeader:
     offset: float
     """Band 1: value = stored * scale + offset."""
     vertical_datum: str | None
-    """The tag that ``write_dsm`` leaves."""
+    """By ``DATUM_TAG``."""
 
     @classmethod
     def from_json(cls, fields: dict[str, Any]) -> RasterHeader:

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from affine import Affine
 
 from planning.errors import RasterFormatError
 from planning.terrain.rasters.header import RasterHeader, check_georeference, check_surface_bands
 
 _OFF_GRID_PX = 2e-4
 """Tiles that lie farther than this from the first one's grid are on another one."""
+_CLAIM_OFF_PX = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,16 +34,111 @@ class Spot:
 
 
 @dataclass(frozen=True, slots=True)
+class Claim:
+    """What a virtual raster says of one of its tiles."""
+
+    nodata: tuple[float, ...]
+    """Numbers that it calls unknown."""
+    source_rect: tuple[float, float, float, float]
+    """First column and row, columns and rows of the tile; those of the virtual raster are ``target_rect``."""
+    target_rect: tuple[float, float, float, float]
+    size_px: tuple[int, int]
+    """Columns and rows of the virtual raster."""
+    transform: tuple[float, ...]
+    """a, b, c, d, e, f of (column, row) -> (x, y) of the virtual raster."""
+    dtype: str
+    scale: float
+    offset: float
+    unit: str
+    """Empty: it says none, as ``vertical_datum``."""
+    vertical_datum: str
+
+    @classmethod
+    def from_json(cls, fields: dict[str, Any]) -> Claim:
+        """What ``as_json`` wrote."""
+        lists: dict[str, Any] = {name: tuple(value) for name, value in fields.items() if isinstance(value, list)}
+        return cls(**{**fields, **lists})
+
+    def as_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+    def difference(self, tile: RasterHeader) -> str | None:
+        """What it says otherwise than the tile does, in words; None: nothing."""
+        whole = (0.0, 0.0, float(tile.width_px), float(tile.height_px))
+        left, top, *size = self.target_rect
+        if self.source_rect != whole or (*size,) != whole[2:]:
+            return "crops or stretches it"
+        if min(left, top) < -_CLAIM_OFF_PX or any(
+            at + count > most + _CLAIM_OFF_PX for at, count, most in zip((left, top), size, self.size_px, strict=True)
+        ):
+            return "crops it"
+        if not self._places(tile):
+            return "puts it elsewhere than it lies"
+        if self.dtype != tile.dtypes[0]:
+            return f"changes its numbers from {tile.dtypes[0]} to {self.dtype or 'something else'}"
+        if (self.scale, self.offset) != (tile.scale, tile.offset):
+            return f"scales it by {self.scale:g} from {self.offset:g} on, not by {tile.scale:g} from {tile.offset:g} on"
+        if self.unit and self.unit != (tile.unit or ""):
+            return f'gives its heights the unit "{self.unit}"'
+        if self.vertical_datum and self.vertical_datum != (tile.vertical_datum or ""):
+            return f'gives it the vertical datum "{self.vertical_datum}"'
+        return None
+
+    def _places(self, tile: RasterHeader) -> bool:
+        here = Affine(*self.transform)
+        if here.is_degenerate or tile.affine.is_degenerate:
+            return False
+        brought, (left, top) = ~here @ tile.affine, self.target_rect[:2]
+        corners = ((0, 0), (tile.width_px, 0), (0, tile.height_px))
+        return all(
+            math.dist(brought @ corner, (left + corner[0], top + corner[1])) <= _CLAIM_OFF_PX for corner in corners
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Mosaic:
     """The raster that tiles make together."""
 
     header: RasterHeader
+    first: RasterHeader
+    """The first tile's, with which all others were compared."""
     spots: tuple[Spot, ...]
     """One for each tile, in their order."""
+    unknown: Mapping[int, tuple[float, ...]]
+    """By a tile's number: what a virtual raster calls unknown and the tile does not."""
+
+    def is_tile(self, number: int, header: RasterHeader) -> bool:
+        """Whether a tile that is opened again is still the one that was judged."""
+        spot, start = self.spots[number], self.spots[0]
+        return (
+            (header.height_px, header.width_px, header.bands) == (spot.rows, spot.columns, self.first.bands)
+            and _difference(self.first, header) is None
+            and _place(self.first, header) == (spot.row0 - start.row0, spot.column0 - start.column0)
+        )
+
+    @classmethod
+    def from_json(cls, fields: dict[str, Any]) -> Mosaic:
+        """What ``as_json`` wrote."""
+        return cls(
+            RasterHeader.from_json(fields["header"]),
+            RasterHeader.from_json(fields["first"]),
+            tuple(Spot(*spot) for spot in fields["spots"]),
+            {int(number): tuple(values) for number, values in fields["unknown"].items()},
+        )
+
+    def as_json(self) -> dict[str, Any]:
+        spots = [(spot.row0, spot.column0, spot.rows, spot.columns) for spot in self.spots]
+        headers = {"header": self.header.as_json(), "first": self.first.as_json()}
+        return {**headers, "spots": spots, "unknown": self.unknown}
 
 
-def mosaic_of(tiles: Sequence[tuple[str, RasterHeader]]) -> Mosaic:
-    """The mosaic of named tiles; RasterFormatError, with the tile's name, where one does not belong to the others."""
+def mosaic_of(
+    tiles: Sequence[tuple[str, RasterHeader]], unknown: Mapping[int, tuple[float, ...]] | None = None
+) -> Mosaic:
+    """The mosaic of named tiles; RasterFormatError, with the tile's name, where one does not belong to the others.
+
+    ``unknown`` are numbers that a virtual raster calls so, by a tile's number.
+    """
     first_name, first = tiles[0]
     for name, header in tiles:
         check_surface_bands(header, where=name)
@@ -66,7 +166,16 @@ def mosaic_of(tiles: Sequence[tuple[str, RasterHeader]]) -> Mosaic:
         transform=transform,
         block_bytes=max(header.block_bytes for _, header in tiles),
     )
-    return Mosaic(header, spots)
+    return Mosaic(header, first, spots, unknown or {})
+
+
+def more_than_a_list(where: str, why: str) -> RasterFormatError:
+    """The refusal of a virtual raster."""
+    return RasterFormatError(
+        f"This virtual raster (VRT) is more than a list of tiles: {why}.",
+        where=where,
+        advice="Write it out as a GeoTIFF: gdal_translate in.vrt out.tif",
+    )
 
 
 def _difference(first: RasterHeader, other: RasterHeader) -> str | None:

@@ -25,14 +25,19 @@ from planning.terrain.rasters.memory_at_hand import (
     check_memory,
     watched,
 )
-from planning.terrain.rasters.ranges import RemoteFile, check_is_tiff
+from planning.terrain.rasters.ranges import REQUEST_S, Look, RemoteFile, check_is_tiff
 from planning.terrain.rasters.surface_plan import SurfacePlan, plan_surface
 from planning.terrain.rasters.tiles import tiles_of
+from planning.terrain.rasters.virtual import check_crs
 
 _TILE_HEADER_S = 0.02
 """2 ms were measured."""
+_REMOTE_HEADER_S = 3 * REQUEST_S
+_DIGEST_BYTES_S = 20e6
+"""Of a slow disk."""
+_SLOW_NETWORK = "Check server and network, or download the file and give that."
 Progress = Callable[[str, float], None]
-"""Called with a stage ("decode", "resample", "spikes") and the share of it that is done."""
+"""Called with a stage ("digest", "decode", "resample", "spikes") and the share of it that is done."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +84,10 @@ class Read:
     """Of these pixels."""
     sample: HeightStats
     """Of blocks all over the file, where asked for."""
+    identity: tuple[int | str, ...]
+    """Of the file, or of its tiles, before and after this look (``files_identity``)."""
+    layout: dict[str, Any] | None
+    """Of a mosaic, after the first look: spares the next one that of every tile."""
 
 
 def read_surface(
@@ -86,18 +95,42 @@ def read_surface(
     declared: Declared,
     wanted: Callable[[RasterHeader], Pixels | None],
     *,
-    first_look: bool,
+    first: Read | None,
     progress: Progress | None = None,
 ) -> Read:
-    """The pixels that ``wanted`` asks for when it knows the header; the digest too at the ``first_look``.
+    """The pixels that ``wanted`` asks for when it knows the header; the digest too where this is the ``first`` look.
 
-    A first look that asks for no pixels takes a sample. Raises the RasterError that refuses the file.
+    A first look that asks for no pixels takes a sample. Raises the RasterError that refuses the file, also one that
+    is changed while it is read, or is another than at the first look.
     """
+    identity = files_identity(source, virtual=declared.virtual)
+    if first is not None and identity != first.identity:
+        raise _changed(source)
+    try:
+        read = _read(source, declared, wanted, first=first, progress=progress)
+    except RasterError as error:
+        if _is_changed(source, identity, virtual=declared.virtual):
+            raise _changed(source) from error
+        raise
+    if _is_changed(source, identity, virtual=declared.virtual):
+        raise _changed(source)
+    return replace(read, identity=identity)
+
+
+def _read(
+    source: Path | RemoteFile,
+    declared: Declared,
+    wanted: Callable[[RasterHeader], Pixels | None],
+    *,
+    first: Read | None,
+    progress: Progress | None,
+) -> Read:
     plans: list[SurfacePlan] = []
     asked: list[Pixels | None] = []
 
     def order(fields: dict[str, Any]) -> dict[str, Any]:
         header = RasterHeader.from_json(fields)
+        check_crs(job.get("crs", ""), header.crs_wkt, where=source.name)
         plans.append(
             plan_surface(
                 header,
@@ -113,20 +146,21 @@ def read_surface(
         if box is not None:
             _check_read(plans[0], box, declared.limits, where=source.name)
         pixels = None if box is None else [box.row0, box.column0, box.rows, box.columns]
-        return {"pixels": pixels, "digest": first_look, "sample": first_look and pixels is None}
+        return {"pixels": pixels, "digest": first is None, "sample": first is None and pixels is None}
 
     with (
         sandbox.private_directory() as directory,
-        _grid_job(source, directory, virtual=declared.virtual) as (job, pipe),
+        _grid_job(source, directory, virtual=declared.virtual, first=first) as (job, pipe),
     ):
         answer = sandbox.run_job(
             job,
             directory=directory,
-            limits=_with_time_for(job, declared.limits),
+            limits=_with_time_for(job, declared.limits, first_look=first is None),
             where=source.name,
             on_header=order,
             progress=watched(progress, where=source.name),
             pipe=pipe,
+            **({"smaller": _SLOW_NETWORK} if isinstance(source, RemoteFile) else {}),
         )
         stored, box = None, asked[0]
         if box is not None:
@@ -134,7 +168,7 @@ def read_surface(
             stored = np.asarray(np.memmap(job["target"], dtype=np.float32, mode="r+", shape=(box.rows, box.columns)))
     stats, sample = (HeightStats.from_json(answer[name]) for name in ("stats", "sample"))
     sha256 = source.sha256 if isinstance(source, RemoteFile) else answer["sha256"]
-    return Read(plans[0], sha256, stored, stats, sample)
+    return Read(plans[0], sha256, stored, stats, sample, (), answer["layout"])
 
 
 def all_of(header: RasterHeader) -> Pixels:
@@ -164,27 +198,42 @@ def _squares_of(plan: SurfacePlan, cells: int) -> int:
     return rows * columns * cells // whole
 
 
-def _with_time_for(job: dict[str, Any], limits: RasterLimits) -> RasterLimits:
-    """Of a mosaic each tile's header is read first."""
-    return replace(limits, header_s=limits.header_s + _TILE_HEADER_S * len(job.get("tiles", ())))
+def _with_time_for(job: dict[str, Any], limits: RasterLimits, *, first_look: bool) -> RasterLimits:
+    """Of a mosaic each tile's header is read first, at a first look all bytes; a network has its own time."""
+    if "pipe" in job:
+        return replace(limits, header_s=max(limits.header_s, _REMOTE_HEADER_S))
+    tiles: list[dict[str, Any]] = job.get("tiles", [])
+    size_bytes = sum(os.stat(file["source"]).st_size for file in tiles or [job]) if first_look else 0
+    return replace(
+        limits,
+        header_s=limits.header_s + _TILE_HEADER_S * len(tiles),
+        decode_s=limits.decode_s + size_bytes / _DIGEST_BYTES_S,
+    )
 
 
 @contextmanager
 def _grid_job(
-    source: Path | RemoteFile, directory: Path, *, virtual: bool
+    source: Path | RemoteFile, directory: Path, *, virtual: bool, first: Read | None
 ) -> Iterator[tuple[dict[str, Any], Sequence[int]]]:
     """The job, and the child's ends of the pipe through which it reads a file that is not here."""
     if isinstance(source, Path):
-        yield raster_job("read_grid", source, directory, virtual=virtual), ()
+        job = raster_job("read_grid", source, directory, virtual=virtual)
+        yield job if first is None or first.layout is None else {**job, "layout": first.layout}, ()
         return
-    check_is_tiff(source)
-    with served(source.read) as end:
-        job = {"job": "read_grid", "driver": "GTiff", "pipe": end.child, "size_bytes": source.size_bytes}
-        try:
-            yield {**job, "target": str(directory / token_hex(8))}, end.child
-        except RasterError as error:
-            # What the child says of bytes that it did not get is no news.
-            raise end.error or error from error
+    look = Look(source)
+    try:
+        check_is_tiff(source)
+        with served(look.read, look.stop) as end:
+            job = {"job": "read_grid", "driver": "GTiff", "pipe": end.child, "size_bytes": source.size_bytes}
+            try:
+                yield {**job, "target": str(directory / token_hex(8))}, end.child
+            except RasterError as error:
+                # What the child says of bytes that it did not get is no news.
+                raise end.error or error from error
+            if end.error is not None:
+                raise end.error
+    finally:
+        source.close()
 
 
 def raster_job(name: str, source: Path, directory: Path, *, virtual: bool = False) -> dict[str, Any]:
@@ -193,7 +242,10 @@ def raster_job(name: str, source: Path, directory: Path, *, virtual: bool = Fals
     tiles = tiles_of(source, virtual=virtual)
     if tiles is None:
         return {**job, **_linked(source, directory)}
-    return {**job, "tiles": [{"name": tile.name, **_linked(tile, directory)} for tile in tiles]}
+    linked: list[dict[str, Any]] = [{"name": tile.name, **_linked(tile, directory)} for tile in tiles.paths]
+    for tile, claim in zip(linked, tiles.claims or (), strict=bool(tiles.claims)):
+        tile["claim"] = claim.as_json()
+    return {**job, "tiles": linked, "crs": tiles.crs}
 
 
 def _linked(source: Path, directory: Path) -> dict[str, str]:
@@ -204,13 +256,28 @@ def _linked(source: Path, directory: Path) -> dict[str, str]:
 
 
 def files_identity(source: Path | RemoteFile, *, virtual: bool) -> tuple[int | str, ...]:
-    """Changes when the file, or any tile, is written, replaced, added or removed; a server's file notices it itself."""
+    """Changes when the file, any tile or the list of them is written, replaced, added or removed.
+
+    A file on a server notices it itself.
+    """
     if isinstance(source, RemoteFile):
         return (source.sha256,)
     tiles = tiles_of(source, virtual=virtual)
     if tiles is None:
         return _file_identity(source)
-    return tuple(mark for tile in tiles for mark in (str(tile), *_file_identity(tile)))
+    listed = () if source.is_dir() else _file_identity(source)
+    return (*listed, *(mark for tile in tiles.paths for mark in (str(tile), *_file_identity(tile))))
+
+
+def _is_changed(source: Path | RemoteFile, identity: tuple[int | str, ...], *, virtual: bool) -> bool:
+    try:
+        return files_identity(source, virtual=virtual) != identity
+    except RasterError:
+        return True  # it is gone
+
+
+def _changed(source: Path | RemoteFile) -> RasterError:
+    return RasterError("It was changed while it was read.", where=source.name, advice="Start again.")
 
 
 def _file_identity(source: Path) -> tuple[int, int, int]:

@@ -24,7 +24,7 @@ Progress = Callable[[str, float], None]
 _PACKAGE = __name__.rpartition(".")[0]
 _ROOT = Path(__file__).resolve().parents[__name__.count(".")]
 _COMMAND = [sys.executable, "-P", "-m", f"{_PACKAGE}.worker"]
-_LONGEST_MESSAGE = 2**20
+_LONGEST_MESSAGE = 2**22
 _SMALLER = "Rewrite it as a tiled GeoTIFF, or crop it to the area of the flight."
 _ERRORS = {"format": RasterFormatError, "too_large": RasterTooLargeError, "no_elevation": NoElevationError}
 # GDAL reads these before Python can set them through rasterio.Env: drivers register on import.
