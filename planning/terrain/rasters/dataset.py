@@ -230,7 +230,12 @@ def written_blocks(source: Any) -> Iterator[Window]:
     count = -(-source.height // height) * across
     for number in _spread(count):
         row, column = divmod(number, across)
-        if source.driver != "GTiff" or source.get_tag_item(f"BLOCK_OFFSET_{column}_{row}", "TIFF", bidx=1) is not None:
+        # Without a number for unknown, what is not held reads as 0, and is known.
+        if (
+            source.driver != "GTiff"
+            or source.nodata is None
+            or source.get_tag_item(f"BLOCK_OFFSET_{column}_{row}", "TIFF", bidx=1) is not None
+        ):
             top, left = row * height, column * width
             yield Window(left, top, min(width, source.width - left), min(height, source.height - top))  # pyright: ignore[reportCallIssue]
 
