@@ -23,8 +23,8 @@ from planning.terrain.rasters import georef, sandbox
 from planning.terrain.rasters.assemble import ReadReport, assemble
 from planning.terrain.rasters.dsm_file import DsmFile
 from planning.terrain.rasters.header import RasterHeader, RasterLimits, check_georeference, check_size
+from planning.terrain.rasters.http_ranges import RemoteFile
 from planning.terrain.rasters.memory_at_hand import watched
-from planning.terrain.rasters.ranges import RemoteFile
 from planning.terrain.rasters.reading import Declared, Progress, all_of, raster_job, read_surface
 from planning.terrain.spikes import find_spikes
 from planning.terrain.spikes import remove_spikes as without_spikes

@@ -26,12 +26,12 @@ from telemetry.recording.ros.placing import BASE_LINK, FORWARD_LEFT_UP, MOST_GAP
 from telemetry.recording.ros.point_messages import MalformedMessageError, points_of
 from telemetry.recording.ros.pose_messages import frame_name, pose_of, stamp_ns_of, transform_of
 from telemetry.recording.ros.transforms import Gap, Transform
-from telemetry.ros2.address import ZenohAddress
-from telemetry.ros2.clocks import Measured, SessionClocks
-from telemetry.ros2.frames import FrameError, LiveTransforms
 from telemetry.ros2.listener import Heard, Ros2Listener
-from telemetry.ros2.watch import TopicWatch
-from telemetry.ros2.words import Words
+from telemetry.ros2.message_times import Measured, SessionClocks
+from telemetry.ros2.robot_frames import FrameError, LiveTransforms
+from telemetry.ros2.topic_faults import Words
+from telemetry.ros2.topic_watch import TopicWatch
+from telemetry.ros2.zenoh_endpoint import ZenohAddress
 
 TF_TOPIC, TF_STATIC_TOPIC = "/tf", "/tf_static"
 ROWS = {"points": 4, "pose": 100, TF_TOPIC: 1000, TF_STATIC_TOPIC: 1000}

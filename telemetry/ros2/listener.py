@@ -14,10 +14,10 @@ from telemetry.errors import Ros2Error
 from telemetry.recording.ros.bag_types import POINT_TYPES, POSE_TYPES, TF
 from telemetry.recording.ros.ros2_messages import Ros2Messages, UnreadableMessageError
 from telemetry.ros2 import grammar
-from telemetry.ros2.address import ZenohAddress
 from telemetry.ros2.graph import Graph
-from telemetry.ros2.inbox import Inbox
+from telemetry.ros2.waiting_messages import Inbox
 from telemetry.ros2.wire import MOST_BYTES, Ros2Wire, WireSample
+from telemetry.ros2.zenoh_endpoint import ZenohAddress
 
 AGAIN_S = (0.5, 1.0, 2.0, 5.0)
 MOST_REASONS, OTHER_REASONS = 200, "It cannot be read, for other reasons."

@@ -18,7 +18,7 @@ import zenoh
 import zenoh.ext
 
 from telemetry.errors import Ros2Error
-from telemetry.ros2.address import ZenohAddress
+from telemetry.ros2.zenoh_endpoint import ZenohAddress
 
 MOST_BYTES = 32_000_000
 """Of one message; more is counted, and not read."""

@@ -9,12 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from telemetry.topics.fencing import Operator as Operator
+from telemetry.topics.fencing import OperatorRequest
+from telemetry.topics.fencing import highest_possible_token as highest_possible_token
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.obstacles import AvoidBy
 from telemetry.topics.onboard_lists import Item, PlaceList
-from telemetry.topics.operators import Operator as Operator
-from telemetry.topics.operators import OperatorRequest
-from telemetry.topics.operators import highest_possible_token as highest_possible_token
 from telemetry.topics.parameters import ParameterChange
 
 # To the link node. What it answers stands behind the arrow; errors come back as DescribedError.

@@ -21,7 +21,7 @@ from planning.errors import ParameterError, RasterError, RasterFormatError
 from planning.terrain.geotiff import open_dsm, read_dsm
 from planning.terrain.rasters import dsm_file
 from planning.terrain.rasters.byte_pipe import Served, served
-from planning.terrain.rasters.ranges import Look, RemoteFile, is_address
+from planning.terrain.rasters.http_ranges import Look, RemoteFile, is_address
 from tests.planning.geotiff_samples import hill, write_raster
 
 

@@ -30,8 +30,8 @@ from planning.terrain.geotiff import open_dsm, read_dsm, read_dsm_reported
 from planning.terrain.rasters import dataset, dsm_file, reading
 from planning.terrain.rasters.dataset import opened_grid
 from planning.terrain.rasters.header import RasterHeader, RasterLimits
+from planning.terrain.rasters.http_ranges import REQUEST_S
 from planning.terrain.rasters.mosaic import mosaic_of
-from planning.terrain.rasters.ranges import REQUEST_S
 from planning.terrain.rasters.reading import Declared, Pixels, all_of, read_surface
 from tests.planning.geotiff_samples import HALF_METRE, hill, write_raster
 

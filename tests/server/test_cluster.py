@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import dask
+import dask.config
 import distributed
 import numpy as np
 import pytest

@@ -14,7 +14,7 @@ from typing import Any
 
 from telemetry.agent.client import Reading
 from telemetry.agent.ros2_source import Ros2Asked, Ros2Source
-from telemetry.ros2.address import zenoh_address
+from telemetry.ros2.zenoh_endpoint import zenoh_address
 
 PATIENCE_S = 60.0
 

@@ -15,13 +15,13 @@ from telemetry.errors import Ros2AddressError
 from telemetry.recording.ros.ros2_messages import Ros2Messages
 from telemetry.recording.ros.transforms import Gap, Transform
 from telemetry.ros2 import grammar
-from telemetry.ros2.address import zenoh_address
-from telemetry.ros2.clocks import MOST_BEHIND_S, SessionClocks, StampClock
-from telemetry.ros2.frames import FrameError, LiveTransforms
 from telemetry.ros2.graph import Graph
-from telemetry.ros2.inbox import Inbox
+from telemetry.ros2.message_times import MOST_BEHIND_S, SessionClocks, StampClock
+from telemetry.ros2.robot_frames import FrameError, LiveTransforms
+from telemetry.ros2.topic_faults import MOST_REASONS, OVER_S, Words
+from telemetry.ros2.waiting_messages import Inbox
 from telemetry.ros2.wire import WireSample
-from telemetry.ros2.words import MOST_REASONS, OVER_S, Words
+from telemetry.ros2.zenoh_endpoint import zenoh_address
 
 STRING_HASH = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
 TALKER = (

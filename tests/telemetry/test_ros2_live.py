@@ -14,9 +14,9 @@ import pytest
 from telemetry.agent.client import CloudReading, NoticeReading, RadarReading
 from telemetry.agent.link_messages import Slam
 from telemetry.agent.ros2_source import ROWS, Ros2Asked
-from telemetry.ros2.address import zenoh_address
 from telemetry.ros2.listener import Ros2Listener
 from telemetry.ros2.wire import MOST_BYTES
+from telemetry.ros2.zenoh_endpoint import zenoh_address
 from tests.telemetry.ros2_bench import Process, free_port, process, reading, wait_for
 from tests.telemetry.ros2_robot import CLOUD, GID, ODOM, TF, cloud, transforms
 

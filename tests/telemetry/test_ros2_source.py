@@ -13,9 +13,9 @@ from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Re
 from telemetry.agent.link_messages import Slam
 from telemetry.agent.ros2_source import Ros2Asked, Ros2Source
 from telemetry.recording.ros.ros2_messages import Ros2Messages
-from telemetry.ros2.address import zenoh_address
 from telemetry.ros2.graph import Graph
 from telemetry.ros2.listener import Heard
+from telemetry.ros2.zenoh_endpoint import zenoh_address
 from tests.telemetry.ros2_robot import cloud, odometry, transforms
 
 KINDS = {"tf": "tf2_msgs/msg/TFMessage", "cloud": "sensor_msgs/msg/PointCloud2", "odom": "nav_msgs/msg/Odometry"}

@@ -21,9 +21,9 @@ from telemetry.agent.ros2_source import Ros2Asked
 from telemetry.bus.bus import Bus
 from telemetry.recording.ros.ros2_messages import Ros2Messages
 from telemetry.recording.ros.ros2_writer import Ros2Writer
-from telemetry.ros2.address import zenoh_address
 from telemetry.ros2.telling import Ros2Teller
 from telemetry.ros2.wire import Ros2Wire
+from telemetry.ros2.zenoh_endpoint import zenoh_address
 from telemetry.topics.messages import Topic
 from telemetry.topics.obstacles import MapDelta, MapOrigin, ObstacleAlert, pack_keys
 from telemetry.topics.vehicle import VehicleState

@@ -12,8 +12,8 @@ from planning.terrain.dsm import LARGE_PX, Dsm, SurfaceModel
 from planning.terrain.rasters.assemble import ReadReport, assemble
 from planning.terrain.rasters.header import RasterHeader
 from planning.terrain.rasters.heights import doubts, mask_and_scale
+from planning.terrain.rasters.http_ranges import WEAK_WORDS, RemoteFile
 from planning.terrain.rasters.part_of import model_grid, needed_pixels, part_of
-from planning.terrain.rasters.ranges import WEAK_WORDS, RemoteFile
 from planning.terrain.rasters.reading import Declared, Pixels, Progress, Read, all_of, read_surface
 
 AHEAD_PX = 256

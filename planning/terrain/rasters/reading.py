@@ -18,6 +18,7 @@ from planning.terrain.rasters import sandbox
 from planning.terrain.rasters.byte_pipe import served
 from planning.terrain.rasters.header import RasterHeader, RasterLimits, check_pixels
 from planning.terrain.rasters.heights import HeightStats
+from planning.terrain.rasters.http_ranges import REQUEST_S, Look, RemoteFile, check_is_tiff
 from planning.terrain.rasters.magic import driver_of
 from planning.terrain.rasters.memory_at_hand import (
     BYTES_PER_PX,
@@ -25,7 +26,6 @@ from planning.terrain.rasters.memory_at_hand import (
     check_memory,
     watched,
 )
-from planning.terrain.rasters.ranges import REQUEST_S, Look, RemoteFile, check_is_tiff
 from planning.terrain.rasters.surface_plan import SurfacePlan, plan_surface
 from planning.terrain.rasters.tiles import tiles_of
 from planning.terrain.rasters.virtual import check_crs

@@ -11,7 +11,7 @@ from typing import Annotated
 
 from typer import Option
 
-from server.cli.agent.ros2_options import Ros2Options
+from server.cli.agent.ros2_reading import Ros2Options
 from server.cli.shared.output import say, say_notes
 from server.errors import BadRequestError
 from telemetry.agent.client import Reading

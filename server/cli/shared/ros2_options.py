@@ -8,8 +8,8 @@ from typing import Annotated, ClassVar
 from typer import Option
 
 from server.errors import BadRequestError
-from telemetry.ros2.address import HERE, ZenohAddress, zenoh_address
 from telemetry.ros2.grammar import MOST_DOMAIN
+from telemetry.ros2.zenoh_endpoint import HERE, ZenohAddress, zenoh_address
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from planning.errors import ParameterError
 from planning.planner.part import FLIGHT_MARGIN_M, needed_part
 from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.geotiff import open_dsm, read_dsm_reported
-from planning.terrain.rasters.ranges import RemoteFile, is_address
+from planning.terrain.rasters.http_ranges import RemoteFile, is_address
 from planning.terrain.spikes import Spike, find_spikes
 from server.cli.shared.options import ModelOptions
 from server.cli.shared.output import end_progress, say_notes

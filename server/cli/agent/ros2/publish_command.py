@@ -18,11 +18,11 @@ from server.cli.shared.ros2_options import Ros2Reach
 from server.errors import NotFoundError
 from server.settings import RUNTIME_FOLDER, default_data_dir
 from telemetry.bus.bus import Bus
-from telemetry.ros2.address import ZenohAddress
 from telemetry.ros2.grammar import topic_name
 from telemetry.ros2.outgoing import OUT_TOPICS
 from telemetry.ros2.telling import NODE, Ros2Teller
 from telemetry.ros2.wire import Ros2Wire
+from telemetry.ros2.zenoh_endpoint import ZenohAddress
 
 REACH = Ros2Reach()
 

@@ -6,9 +6,9 @@ import math
 import time
 from collections.abc import Callable, Mapping
 
-from telemetry.ros2.clocks import LARGE_OFFSET_S
 from telemetry.ros2.listener import Ros2Listener
-from telemetry.ros2.words import Words
+from telemetry.ros2.message_times import LARGE_OFFSET_S
+from telemetry.ros2.topic_faults import Words
 
 LOOK_EVERY_S = 0.25
 APPEARS_S = 3.0
