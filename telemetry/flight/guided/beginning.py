@@ -77,7 +77,8 @@ def home_elsewhere(state: VehicleState) -> NotAllowedError | None:
         what = f"Home lies {away_m:.0f} m from where the vehicle stands: an order has fixed it there."
         return NotAllowedError(what, advice=advice)
     up_m = state.alt_rel_home_m or 0.0
-    if not abs(up_m) <= HOME_LEVEL_M:
+    # One that climbs already is above home because of that.
+    if state.landed not in ("taking_off", "in_air") and not abs(up_m) <= HOME_LEVEL_M:
         side = "above" if up_m > 0 else "below"
         what = f"The vehicle stands {abs(up_m):.1f} m {side} home by its own word: every height would be off by that."
         return NotAllowedError(what, advice=advice)
