@@ -166,7 +166,11 @@ def test_thousands_of_small_messages_arrive_in_order(folder: Path) -> None:
                 link.publish(Topic.RAW, RawFrame(float(number), False, "udp", bytes(60)))
                 if number % 100 == 0:
                     await asyncio.sleep(0)
-            frames = [(await anext(reader))[1] for _ in range(4000)]
+            frames = []
+            while len(frames) < 4000:
+                name, message = await anext(reader)
+                # The kept message may come once more, as the answer to who came late.
+                frames += [message] if name == Topic.RAW else []
             assert frames == [RawFrame(float(number), False, "udp", bytes(60)) for number in range(4000)]
 
     run(whole)

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from mapping.errors import RadarDataError
@@ -120,14 +120,14 @@ def test_each_difference_is_said(changes: dict[str, str], words: str) -> None:
      ({"profileCfg": "profileCfg 0 77 x 3 31.5 0 0 11.71 1 256 10000 0 0 30"}, 'idle time is "x"'),
      ({"profileCfg": "profileCfg 0 77 3 3 31.5 0 0 11.71 1 256.5 10000 0 0 30"}, "no whole number"),
      ({"profileCfg": "profileCfg 0 77 3 3 31.5 0 0 0 1 256 10000 0 0 30"}, "must be above 0"),
-     ({"profileCfg": "profileCfg 0 77 3 3 31.5 0 0 nan 1 256 10000 0 0 30"}, "must be above 0"),
+     ({"profileCfg": "profileCfg 0 77 3 3 31.5 0 0 nan 1 256 10000 0 0 30"}, 'the slope is "nan"'),
      ({"profileCfg": "profileCfg 0 77 -3 3 31.5 0 0 11.71 1 256 10000 0 0 30"}, "negative"),
      ({"profileCfg": "profileCfg 0 77 3 3 31.5 0 0 11.71 1 512 10000 0 0 30"}, "the ramp ends after 31.5 us"),
      ({"frameCfg": "frameCfg 0 3 60 0 100 1 0"}, "Chirp 3 has no chirpCfg"),
      ({"frameCfg": "frameCfg 2 0 60 0 100 1 0"}, "no sequence"),
      ({"frameCfg": "frameCfg 0 2 0 0 100 1 0"}, "no frames"),
      ({"frameCfg": "frameCfg 0 2 255 0 10 1 0"}, "a frame has 10 ms"),
-     ({"frameCfg": "frameCfg 0 2 inf 0 10 1 0"}, "no whole number"),
+     ({"frameCfg": "frameCfg 0 2 inf 0 10 1 0"}, 'is "inf"'),
      ({"channelCfg": "channelCfg 15 5 0"}, "TX2 is not switched on"),
      ({"channelCfg": "channelCfg 0 7 0"}, "No receiver"),
      ({"dfeDataOutputMode": "dfeDataOutputMode 3"}, "no sub-frames"),
@@ -161,6 +161,7 @@ NUMBERS = st.sampled_from(
 
 
 @given(st.lists(st.tuples(st.integers(0, 10_000), NUMBERS), min_size=1, max_size=6))
+@example([(440, "nan")])
 def test_any_damage_leaves_a_configuration_or_is_refused(damage: list[tuple[int, str]]) -> None:
     words = [[str(word) for word in line.split()] for line in GOOD.splitlines()]
     places = [(row, column) for row, line in enumerate(words) for column in range(len(line))]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,9 +29,12 @@ class Command:
         if not 0 <= index < len(self.values):
             raise self.error(f"{self.name} has {len(self.values)} values, and {what} is not among them.")
         try:
-            return float(self.values[index])
+            value = float(self.values[index])
         except ValueError:
-            raise self.error(f'{self.name}: {what} is "{self.values[index]}".') from None
+            value = math.nan
+        if not math.isfinite(value):
+            raise self.error(f'{self.name}: {what} is "{self.values[index]}".')
+        return value
 
     def whole(self, index: int, what: str) -> int:
         value = self.number(index, what)
