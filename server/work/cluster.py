@@ -138,9 +138,12 @@ def _client(where: str) -> Iterator[Any]:
         ):
             yield client
         return
+    client = distributed.Client.__new__(distributed.Client)
     try:
-        client = distributed.Client(where, timeout=_JOIN_S, set_as_default=False)
+        client.__init__(where, timeout=_JOIN_S, set_as_default=False)
     except Exception as error:  # it gives up in any way: no answer, no key, an attempt that it cancelled itself
+        # Collected as garbage it would close in any thread, and in that of a loop which starts wait for ever.
+        client.close()
         raise ClusterError(
             f"No Dask scheduler is reached ({type(error).__name__}: {error}).",
             where=where,

@@ -4,6 +4,7 @@ import hashlib
 import importlib
 import os
 import signal
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -72,6 +73,10 @@ def scheduler() -> Iterator[str]:
         yield address
 
 
+def _loops() -> set[int | None]:
+    return {thread.ident for thread in threading.enumerate() if thread.name == "IO loop"}
+
+
 def test_here_pieces_are_done_one_after_another() -> None:
     shares: list[float] = []
     answers = spread(_worked_out, [0, 1, 2, 3], None, shares.append)
@@ -116,8 +121,11 @@ def test_processes_of_its_own_have_keys_of_their_own(monkeypatch: pytest.MonkeyP
     address = running.scheduler.address
     assert address is not None
     assert address.startswith("tls://127.0.0.1:")
+    before = _loops()
     with pytest.raises(ClusterError, match="No Dask scheduler is reached"):
         list(spread(_worked_out, [0], address, lambda share: None))
+    # A client left open waits, wherever it is collected, for a lock that each new loop's start holds.
+    assert _loops() == before
     assert [first, *answers] == [_worked_out(seed) for seed in (0, 1, 2)]
 
 
