@@ -151,14 +151,22 @@ def start(page: Page) -> None:
 
 
 def hold(page: Page, testid: str) -> None:
+    """Until the page has taken it: what moves under the pointer, or cannot be ordered for a moment, ends a hold."""
     button = page.get_by_test_id(testid)
-    expect(button).to_be_enabled()
-    # Where it rests: what comes above it meanwhile moves it on.
-    button.hover()
-    page.mouse.down()
-    # Until the page has taken it: its frames come slowly where the browser renders in software.
-    expect(button).to_have_count(0)
-    page.mouse.up()
+    ready = button.and_(page.locator(":enabled:not([aria-disabled=true])"))
+    expect(ready).to_be_visible()
+
+    def is_taken() -> bool:
+        if ready.count():
+            with contextlib.suppress(TimeoutError, AssertionError):
+                ready.hover(timeout=2000)
+                page.mouse.down()
+                # Its frames come slowly where the browser renders in software.
+                expect(button).to_have_count(0, timeout=5000)
+            page.mouse.up()
+        return not button.count()
+
+    wait_until(page, is_taken)
 
 
 def return_home(page: Page) -> None:
