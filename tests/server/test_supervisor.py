@@ -3,6 +3,7 @@
 import asyncio
 import itertools
 import os
+import re
 import signal
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
@@ -16,7 +17,7 @@ from server.work import node_process, supervisor
 from server.work.node_process import LOG_BYTES, bound_log
 from server.work.supervisor import NodeState, Supervisor
 from telemetry.bus.bus import Bus
-from telemetry.bus.liveness import HUNG_S, STARVED_S, Liveness
+from telemetry.bus.liveness import HUNG_S, START_S, Liveness
 from telemetry.bus.node_lock import NodeFacts, running_node, running_nodes
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -80,7 +81,8 @@ class Watched:
         return next((state for state in self.supervisor.states if state.name == name), None)
 
     async def running(self, name: str, *, restarts: int = 0) -> NodeFacts:
-        await until(lambda: (s := self.state(name)) is not None and (s.state, s.restarts) == ("running", restarts))
+        """Started anew at least so often: on a busy machine one that is slow to start may be ended once more."""
+        await until(lambda: (s := self.state(name)) is not None and s.state == "running" and s.restarts >= restarts)
         facts = running_node(self.folder, name)
         assert facts is not None
         return facts
@@ -326,10 +328,11 @@ def test_a_link_that_hangs_is_said_then_killed_and_started_again(
             state = watched.state("link")
             assert state is not None
             # One that is busy counts as starved where others leave it less than half of a processor; on a machine that
-            # is busy itself, its proof may not have been written before it hung.
-            waited_s = {"stopped": [HUNG_S], "busy": [HUNG_S, STARVED_S, start_s]}.get(how, [start_s])
-            ended = [f"was ended after it had not answered for {s:.0f} s and was started again" for s in waited_s]
-            assert any(words in state.text for words in ended)
+            # is busy itself, its proof may not have been written before it hung, and who looks at it is late.
+            least_s = start_s if how == "busy from its start on" else HUNG_S
+            waited = re.search(r"was ended after it had not answered for (\d+) s and was started again", state.text)
+            assert waited is not None
+            assert least_s <= int(waited[1]) < START_S / 2
             await watched.supervisor.stop("link")
 
     run(whole)
