@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -28,6 +29,12 @@ def test_its_bounds(service: dict[str, Any]) -> None:
     assert (service["read_only"], service["cap_drop"], service["pids_limit"]) == (True, ["ALL"], 512)
     addresses = [port.rpartition(":")[0].rpartition(":")[0] for port in service["ports"]]
     assert addresses == ["127.0.0.1", "${HEDGEHOP_MAVLINK_ADDRESS:-127.0.0.1}"]
+
+
+def test_its_base_is_one_digest_in_both_files(service: dict[str, Any]) -> None:
+    arguments = re.findall(r"^ARG BASE_IMAGE=(\S+)$", (DOCKER / "Dockerfile").read_text(encoding="utf-8"), re.M)
+    assert [service["build"]["args"]["BASE_IMAGE"]] == ["${HEDGEHOP_BASE_IMAGE:-" + base + "}" for base in arguments]
+    assert re.fullmatch(r"debian:bookworm-slim@sha256:[0-9a-f]{64}", *arguments)
 
 
 def test_its_settings_are_known_and_hold_no_secret(service: dict[str, Any]) -> None:
