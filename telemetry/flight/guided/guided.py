@@ -20,8 +20,8 @@ from telemetry.flight.guided.handover import Handover, away_m, is_fresh
 from telemetry.flight.guided.leading import Leading
 from telemetry.flight.guided.orders import GuidedOrders, Place
 from telemetry.flight.guided.pending_command import PendingCommand, Then
-from telemetry.flight.guided.script_targets import bearing_rad
 from telemetry.flight.guided.script_watches import HomeWatched, ModeWatch, Punctuality, Standstill
+from telemetry.flight.guided.whereabouts import Whereabouts
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
 from telemetry.mavlink.conversation import GROUND_STATION, Endpoints
 from telemetry.topics.messages import FlightPhase, FlightStatus, GuidedTarget
@@ -57,8 +57,6 @@ class GuidedScript:
         """``note``: said of the flight while there is nothing else to say. ``feed``: for ArduPilot only."""
         self._note = note
         self._leading = None if feed is None else Leading(feed)
-        self._came_from: Place | None = None
-        """The place that was reached last; nowhere after a take-off or a pause."""
         self._request, self._endpoints, self._orders = request, Endpoints(target, own), GuidedOrders(firmware, target)
         self._watch, self._home_watched, self._punctuality = ModeWatch(), HomeWatched(request.spare_m), Punctuality()
         self._targets = request.targets
@@ -68,7 +66,7 @@ class GuidedScript:
         self.broke_off_at: int | None = None
         self._index = 0
         self._state = state
-        self._home_alt_amsl_m = math.nan
+        self._whereabouts = Whereabouts(state)
         self._pending = PendingCommand(self._endpoints, self._on_failed_command)
         self._handover: Handover | None = None
         self._speed_m_s: float | None = None
@@ -134,8 +132,7 @@ class GuidedScript:
         refusal = why_not_from(self._request, state, now_s)
         if refusal is not None:
             return self._fail(refusal)
-        self._note_home(state)
-        if math.isnan(self._home_alt_amsl_m):
+        if math.isnan(self._whereabouts.home_alt_amsl_m):
             return self._fail(
                 NotAllowedError("The vehicle does not know its height yet.", advice="Wait for its position.")
             )
@@ -154,7 +151,7 @@ class GuidedScript:
         if self.is_over:
             return []
         self._state = state
-        self._note_home(state)
+        self._whereabouts.note(state)
         actions = self._pending.on_state(state, now_s)
         if not self.is_over:
             actions += self._look(state, now_s)
@@ -173,7 +170,7 @@ class GuidedScript:
         if self.phase == "arming":
             return self._interrupt(f"Paused before {'it set out' if self._is_way else 'the take-off'}.")
         if self.phase == "flying":
-            self.phase, self.hint, self._came_from = "paused", "", None
+            self.phase, self.hint, self._whereabouts.came_from = "paused", "", None
             if self._leading is not None:
                 self._leading.stop()
             return self._stay_here(now_s)
@@ -224,7 +221,7 @@ class GuidedScript:
 
     def _climb(self, state: VehicleState, now_s: float) -> list[Action]:
         if not self._is_up(state, now_s):
-            up = replace(self._here(), alt_rel_home_m=self._takeoff_m)
+            up = replace(self._whereabouts.here(self.target), alt_rel_home_m=self._takeoff_m)
             self._stands = self._standstill.words(state, up, "the height of the take-off", now_s)
             return []
         self.phase, self._stands = "flying", ""
@@ -238,7 +235,7 @@ class GuidedScript:
     def _fly(self, state: VehicleState, now_s: float) -> list[Action]:
         assert self._handover is not None
         if self._reached_s is None and self._has_arrived(state, now_s):
-            self._reached_s, self.hint, self._came_from = now_s, "", self._handover.place
+            self._reached_s, self.hint, self._whereabouts.came_from = now_s, "", self._handover.place
             self._punctuality.reached(self.target, now_s)
         if self._reached_s is None:
             self._punctuality.on_the_way(self.target, now_s)
@@ -265,7 +262,8 @@ class GuidedScript:
 
     def _stay_here(self, now_s: float) -> list[Action]:
         """Where the vehicle is by its last position, whose height above the sea no home moves."""
-        self._handover = Handover(self._here(), radius_m=self._request.waypoint_radius_m, holds=True, stays=True)
+        here, radius_m = self._whereabouts.here(self.target), self._request.waypoint_radius_m
+        self._handover = Handover(here, radius_m=radius_m, holds=True, stays=True)
         return self._send_place(now_s)
 
     def _stay_there(self, now_s: float) -> list[Action]:
@@ -291,11 +289,8 @@ class GuidedScript:
     def _return(self, state: VehicleState, now_s: float) -> list[Action]:
         if not state.armed or (state.landed == "on_ground" and self._watch.seen):
             return self._land()
-        return (
-            self._go_home(now_s)
-            if not self._pending.is_under_way and not self._watch.seen and now_s >= self._return_at_s
-            else []
-        )
+        again = not self._pending.is_under_way and not self._watch.seen and now_s >= self._return_at_s
+        return self._go_home(now_s) if again else []
 
     def _land(self) -> list[Action]:
         self.phase, self.hint = "landed", ""
@@ -328,40 +323,27 @@ class GuidedScript:
 
     def _take_off(self, now_s: float) -> list[Action]:
         self.phase = "taking_off"
-        message = self._orders.take_off(self._takeoff_m, self._home_alt_amsl_m)
+        message = self._orders.take_off(self._takeoff_m, self._whereabouts.home_alt_amsl_m)
         return self._pending.begin(message, now_s, once=True, confirm=is_off_the_ground)
 
     def _hand_over(self, now_s: float) -> list[Action]:
         target, self._reached_s = self.target, None
-        place = Place(
-            lat_deg=target.lat_deg,
-            lon_deg=target.lon_deg,
-            alt_rel_home_m=target.alt_rel_home_m,
-            home_alt_amsl_m=self._home_alt_amsl_m,
-            heading_rad=self._heading_rad(target),
-        )
+        place = self._whereabouts.place(target, along_leg=self._orders.firmware == "ardupilot")
         # ArduPilot forgets the speed with the first place after a take-off or a hold: the place comes first.
         actions = self._go_to(place, now_s) if self._leading is None else self._begin_leg(place, now_s)
         return actions if target.speed_m_s == self._speed_m_s else [*actions, *self._set_speed(target.speed_m_s, now_s)]
 
-    def _heading_rad(self, target: GuidedTarget) -> float | None:
-        """As it is asked for, else along the leg: what looks ahead looks where the vehicle goes."""
-        if target.heading_rad is not None or self._orders.firmware != "ardupilot":
-            return target.heading_rad
-        start = self._came_from or self._here()
-        return bearing_rad((start.lat_deg, start.lon_deg), (target.lat_deg, target.lon_deg))
-
     def _begin_leg(self, place: Place, now_s: float) -> list[Action]:
         assert self._leading is not None
         self._handover = Handover(place, radius_m=self._request.waypoint_radius_m)
-        self._leading.go(self._came_from or self._here(), self.left, now_s)
+        self._leading.go(self._whereabouts.start(self.target), self.left, now_s)
         return self._lead(self._state, now_s)
 
     def _lead(self, state: VehicleState, now_s: float) -> list[Action]:
         """Nothing while the vehicle's position is old: it stops by itself."""
         if self._leading is None or self._handover is None or not is_fresh(state, now_s):
             return []
-        at = replace(self._here(), heading_rad=state.heading_rad)
+        at = replace(self._whereabouts.here(self.target), heading_rad=state.heading_rad)
         found = self._leading.set_point(at, now_s, heading_rad=self._handover.place.heading_rad)
         return [] if found is None else [Send(self._orders.follow(found.place, found.v_neu_m_s))]
 
@@ -380,7 +362,7 @@ class GuidedScript:
 
     def _again_if_needed(self, state: VehicleState, now_s: float) -> list[Action]:
         assert self._handover is not None
-        if self._handover.follow_home(self._home_alt_amsl_m) and self._orders.counts_from_sea:
+        if self._handover.follow_home(self._whereabouts.home_alt_amsl_m) and self._orders.counts_from_sea:
             return self._send_place(now_s)
         if not self._handover.must_be_sent_again(state, now_s):
             return []
@@ -414,18 +396,3 @@ class GuidedScript:
     def _fail(self, error: TelemetryError) -> list[Action]:
         self.phase, self.hint = "interrupted", str(error)
         return [Failed(error)]
-
-    # Places.
-
-    def _note_home(self, state: VehicleState) -> None:
-        """Where heights above home begin; what was known once stays known."""
-        if state.alt_amsl_m is not None and state.alt_rel_home_m is not None:
-            self._home_alt_amsl_m = state.alt_amsl_m - state.alt_rel_home_m
-
-    def _here(self) -> Place:
-        """Where the vehicle is; it has come that way, so it is clear."""
-        state = self._state
-        if state.lat_deg is None or state.lon_deg is None or state.alt_rel_home_m is None:
-            target = self.target
-            return Place(target.lat_deg, target.lon_deg, target.alt_rel_home_m, self._home_alt_amsl_m)
-        return Place(state.lat_deg, state.lon_deg, state.alt_rel_home_m, self._home_alt_amsl_m)
