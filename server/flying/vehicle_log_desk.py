@@ -13,8 +13,7 @@ from server.heard.channel import Channel
 from server.library import Library
 from server.library.shelf import iso_utc
 from server.schemas import LogDownloadDoc, VehicleLogDoc, VehicleLogsDoc
-from telemetry.bus.link_client import LinkClient
-from telemetry.bus.log_download import log_stretches
+from telemetry.bus.link_client import LinkClient, log_stretches
 from telemetry.topics.requests import ListVehicleLogs, Operator
 from telemetry.topics.vehicle_logs import VehicleLog
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from dataclasses import replace
 from typing import Any, overload
 
 from telemetry.bus.bus import Bus
 from telemetry.bus.liveness import Liveness
 from telemetry.bus.node_lock import running_node, silence_counts
-from telemetry.errors import BusError, OvertakenError
+from telemetry.errors import BusError, OvertakenError, TransferError
 from telemetry.topics.onboard_lists import Item, OnboardMission, UploadReport
 from telemetry.topics.parameters import ParameterList, ParameterWritten, VehicleMetadata
 from telemetry.topics.requests import (
@@ -35,7 +35,7 @@ from telemetry.topics.requests import (
     UploadPlaces,
     WriteParameters,
 )
-from telemetry.topics.vehicle_logs import VehicleLog
+from telemetry.topics.vehicle_logs import MOST_BYTES, VehicleLog
 
 NAME = "link"
 COMMAND_S = 30.0
@@ -153,3 +153,18 @@ def _patience_s(request: LinkRequest) -> float:
     if isinstance(request, WriteParameters):
         return WRITE_S + WRITE_PER_CHANGE_S * len(request.changes)
     return START_S if isinstance(request, StartAuto | StartGuided | FlyWay) else COMMAND_S
+
+
+async def log_stretches(link: LinkClient, operator: Operator, log: VehicleLog) -> AsyncIterator[bytes]:
+    """The bytes of a vehicle's log in order: who no longer asks has ended it.
+
+    Raises TransferError when it turns out shorter than the vehicle said.
+    """
+    for offset in range(0, log.size_bytes, MOST_BYTES):
+        size = min(MOST_BYTES, log.size_bytes - offset)
+        is_last = offset + size == log.size_bytes
+        stretch = await link.call(ReadVehicleLog(operator, log.number, offset, size, is_last))
+        yield stretch
+        if len(stretch) < size:
+            what = f"Log {log.number} ends after {offset + len(stretch)} of {log.size_bytes} bytes."
+            raise TransferError(what, advice="What came is kept. Ask for the list again: the log may have changed.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +15,6 @@ from telemetry.recording.ros.bag_types import POINT_TYPES, POSE_TYPES, TF
 from telemetry.recording.ros.ros2_messages import Ros2Messages, UnreadableMessageError
 from telemetry.ros2 import grammar
 from telemetry.ros2.graph import Graph
-from telemetry.ros2.waiting_messages import Inbox
 from telemetry.ros2.wire import MOST_BYTES, Ros2Wire, WireSample
 from telemetry.ros2.zenoh_endpoint import ZenohAddress
 
@@ -38,6 +37,39 @@ class Heard:
     """Messages of this publisher before it that were not read: lost on the way, or dropped here."""
     received_mono_s: float
     received_utc_s: float
+
+
+class Inbox:
+    """What has come and was not worked on yet, one row for each name; who is slow loses the oldest.
+
+    ``put`` never blocks; ``take`` empties rows by turns, so that none waits for ever.
+    """
+
+    def __init__(self, most: Mapping[str, int]) -> None:
+        """``most``: how many wait under each name."""
+        self._rows: dict[str, deque[WireSample]] = {name: deque(maxlen=count) for name, count in most.items()}
+        self._ready, self._next = threading.Condition(), 0
+        self.dropped = dict.fromkeys(most, 0)
+        """By name: that were not taken in time."""
+
+    def put(self, name: str, sample: WireSample) -> None:
+        with self._ready:
+            row = self._rows[name]
+            self.dropped[name] += len(row) == row.maxlen
+            row.append(sample)
+            self._ready.notify()
+
+    def take(self, timeout_s: float) -> tuple[str, WireSample] | None:
+        """The oldest of the next row that is not empty; None when nothing came in that time."""
+        with self._ready:
+            self._ready.wait_for(lambda: any(self._rows.values()), timeout_s)
+            names = list(self._rows)
+            for place in range(self._next, self._next + len(names)):
+                name = names[place % len(names)]
+                if row := self._rows[name]:
+                    self._next = place % len(names) + 1
+                    return name, row.popleft()
+        return None
 
 
 class Ros2Listener:

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from mapping.errors import ParameterError
-from mapping.voxels.ply import ply
+from mapping.voxels.point_files import ply
 
 POINTS = np.array([[512_345.678, 4_180_000.123, 91.5], [-1.0, 0.0, 2.25]])
 

@@ -13,7 +13,7 @@ from rosbags.highlevel import AnyReader
 
 from mapping.errors import ParameterError
 from mapping.geometry.frames import LocalFrame
-from mapping.voxels.pcd import pcd
+from mapping.voxels.point_files import pcd
 from planning.terrain.clouds.cloud_tables import pcd_table
 from planning.terrain.geotiff import read_dsm
 from telemetry.perception.rebuilding.export import KINDS, ExportError, clusters, exported, outline

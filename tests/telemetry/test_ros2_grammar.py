@@ -16,10 +16,10 @@ from telemetry.recording.ros.ros2_messages import Ros2Messages
 from telemetry.recording.ros.transforms import Gap, Transform
 from telemetry.ros2 import grammar
 from telemetry.ros2.graph import Graph
+from telemetry.ros2.listener import Inbox
 from telemetry.ros2.message_times import MOST_BEHIND_S, SessionClocks, StampClock
 from telemetry.ros2.robot_frames import FrameError, LiveTransforms
 from telemetry.ros2.topic_faults import MOST_REASONS, OVER_S, Words
-from telemetry.ros2.waiting_messages import Inbox
 from telemetry.ros2.wire import WireSample
 from telemetry.ros2.zenoh_endpoint import zenoh_address
 

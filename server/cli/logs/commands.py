@@ -21,7 +21,7 @@ from server.cli.shared.output import answer, end_progress, progress, say
 from server.cli.shared.own_nodes import OPERATOR, Station, own_nodes
 from server.errors import StorageError
 from server.library.shelf import iso_utc
-from telemetry.bus.log_download import log_stretches
+from telemetry.bus.link_client import log_stretches
 from telemetry.errors import NoVehicleError, TelemetryError
 from telemetry.flight.preflight.prepare import connect
 from telemetry.flight.watch import watching

@@ -13,7 +13,6 @@ import typer
 from typer import Argument, Option
 
 from planning.errors import FormatError, ParameterError
-from server.cli.params.kept_descriptions import descriptions
 from server.cli.params.params_session import ParameterSession, parameter_session
 from server.cli.params.tables import (
     Descriptions,
@@ -30,10 +29,12 @@ from server.cli.shared.command import DONE, FAILED, command
 from server.cli.shared.files_in_out import check_directory, read_small, write_files
 from server.cli.shared.output import answer, say, say_notes
 from server.errors import StorageError
+from server.flying.descriptions import keep_descriptions, kept_descriptions
 from telemetry.errors import TelemetryError
 from telemetry.mavlink.address import parse_addresses
 from telemetry.parameters.comparing import compare as compared
 from telemetry.parameters.comparing import of_vehicle
+from telemetry.parameters.described import Description, read_descriptions
 from telemetry.parameters.files import (
     FileParameter,
     ParameterFile,
@@ -44,6 +45,7 @@ from telemetry.parameters.files import (
     write_qgc,
 )
 from telemetry.topics.parameters import Outcome, Parameter, ParameterChange, ParameterWritten
+from telemetry.topics.vehicle import Autopilot
 
 About = Annotated[
     Path | None,
@@ -115,7 +117,7 @@ async def _read(
     link: str, data_dir: Path | None, about: Path | None, wanted: Sequence[str], *, whole: bool
 ) -> tuple[str, list[Parameter], Descriptions]:
     async with parameter_session(link, data_dir) as session:
-        described = descriptions(about, data_dir, session.vehicle.autopilot)
+        described = _descriptions(about, data_dir, session.vehicle.autopilot)
         if wanted and not whole and not any(set(name) & set("*?[") for name in wanted):
             values = await session.named(wanted)
             return session.title, [Parameter(n, v) for n, v in values.items() if v is not None], described
@@ -145,7 +147,7 @@ async def _set(
     link: str, data_dir: Path | None, about: Path | None, changes: list[ParameterChange], even_armed: bool
 ) -> tuple[list[ParameterWritten], Descriptions]:
     async with parameter_session(link, data_dir) as session:
-        described = descriptions(about, data_dir, session.vehicle.autopilot)
+        described = _descriptions(about, data_dir, session.vehicle.autopilot)
         _note_ranges(changes, described)
         return await session.write(changes, _say_written, even_armed=even_armed), described
 
@@ -259,7 +261,7 @@ async def _load(
     link: str, data_dir: Path | None, about: Path | None, chosen: list[FileParameter], even_armed: bool
 ) -> tuple[list[ParameterWritten], Descriptions]:
     async with parameter_session(link, data_dir) as session:
-        described = descriptions(about, data_dir, session.vehicle.autopilot)
+        described = _descriptions(about, data_dir, session.vehicle.autopilot)
         made = compared(chosen, of_vehicle(await session.whole_list()))
         by_name = {p.name: p for p in chosen}
         changes = [ParameterChange(d.name, by_name[d.name].value) for d in made.different]
@@ -341,3 +343,16 @@ def _say_written(written: ParameterWritten) -> None:
 def _tell(written: list[ParameterWritten], described: Descriptions, *, as_json: bool) -> None:
     answer(written_json(written), written_summary(written, described), as_json=as_json)
     raise typer.Exit(DONE if all(w.took for w in written) else FAILED)
+
+
+def _descriptions(given: Path | None, data_dir: Path | None, autopilot: Autopilot) -> dict[str, Description]:
+    """The autopilot's own words, by name; empty where no file was ever given. A given one is kept for it."""
+    if given is not None:
+        data = read_small(given)
+        if data_dir is None:
+            return read_descriptions(given.name, data)
+        return keep_descriptions(data_dir, autopilot, given.name, data)
+    found, why = ({}, "") if data_dir is None else kept_descriptions(data_dir, autopilot)
+    if why:
+        say_notes(why)
+    return found

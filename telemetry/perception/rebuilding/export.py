@@ -18,8 +18,7 @@ from scipy.spatial import ConvexHull
 from mapping.geometry.arrays import F64, I32, I64
 from mapping.voxels.map import VoxelMap
 from mapping.voxels.octomap_bt import tree_data, write_bt
-from mapping.voxels.pcd import pcd
-from mapping.voxels.ply import ply
+from mapping.voxels.point_files import pcd, ply
 from planning.terrain.dsm import Dsm
 from planning.terrain.geotiff import write_dsm
 from telemetry.errors import TelemetryError
