@@ -5,7 +5,6 @@ Commands are made here from live data only; nothing of a replay comes near it.
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
 import time
 from collections.abc import AsyncIterator, Collection
@@ -20,10 +19,10 @@ from server.flying.checklist_desk import ChecklistDesk
 from server.flying.in_flight.take_up_desk import FIRMWARES, TakingUp, with_words
 from server.flying.in_flight.take_up_task import AskedTakeUp, MadeTakeUp
 from server.flying.starting import Ready, check_goes_on, check_start, preflight_now
-from server.flying.upload_task import MadeUpload
+from server.flying.uploading.uploads import Uploads
 from server.flying.work import FlightWork
 from server.heard.channel import Channel
-from server.heard.onboard import Aboard, onboard
+from server.heard.onboard import Aboard
 from server.obstacles.obstacle_watch import Watch
 from server.schemas import (
     CheckRow,
@@ -39,20 +38,16 @@ from server.schemas import (
 from server.workspace import Workspace
 from telemetry.bus.bus import Bus
 from telemetry.bus.link_client import LinkClient
-from telemetry.errors import NotAllowedError, NoVehicleError, TransferError
+from telemetry.errors import NotAllowedError, NoVehicleError
 from telemetry.mavlink.flight_keeper import item_of
 from telemetry.topics.messages import FlightStatus, LinkStatus, PlanRecord, Topic
-from telemetry.topics.onboard_lists import Item, OnboardMission, PlaceList, UploadReport
 from telemetry.topics.requests import (
     Download,
-    DownloadPlaces,
     LinkRequest,
     Operator,
     Resume,
     StartAuto,
     StartGuided,
-    Upload,
-    UploadPlaces,
 )
 from telemetry.topics.vehicle import VehicleState
 
@@ -75,7 +70,7 @@ class FlightDesk:
     ) -> None:
         """``is_alone``: the station has no other vehicle."""
         self._link, self._work, self._aboard, self._workspace = link, work, aboard, workspace
-        self._checklist, self._taking_up = checklist, taking_up
+        self._checklist, self._taking_up, self._uploads = checklist, taking_up, Uploads(link, aboard, bus)
         self._live, self._watch, self._bus, self._pages = live, watch, bus, pages
         self._utc_minus_mono_s = time.time() - time.monotonic()
         self._flight = FlightStatus()
@@ -86,8 +81,6 @@ class FlightDesk:
         """How often parameters were written."""
         self._told: FlyState | None = None
         self._taken_up: TakenUpDoc | None = None
-        self._lists_sent: dict[PlaceList, tuple[Item, ...]] = {}
-        """Fence and rally points that were sent last, whatever came of it."""
 
     @property
     def state(self) -> FlyState:
@@ -107,8 +100,9 @@ class FlightDesk:
         before = self._aboard.vehicle
         self._aboard.on_link(status)
         if self._aboard.vehicle != before:
-            self._at_fence, self._taken_up, self._lists_sent, self._live.returns = "", None, {}, ReturnSpeeds()
+            self._at_fence, self._taken_up, self._live.returns = "", None, ReturnSpeeds()
             self._taking_up.forget()
+            self._uploads.forget()
         self._checklist.on_link(status, armed=self._live.state is not None and self._live.state.armed)
         if self._ready is not None and not _still_holds(self._ready, status):
             self._ready = None
@@ -154,8 +148,7 @@ class FlightDesk:
 
     def tell_recorder(self) -> None:
         """Which plan is flown."""
-        if (record := self._aboard.record) is not None:
-            self._bus.publish(Topic.PLAN, record)
+        self._uploads.tell_recorder()
 
     # What is asked
 
@@ -165,8 +158,9 @@ class FlightDesk:
             self._ready = None
             made = await self._work.made_upload(revision, self._aboard.uploaded)
             _check_firmware(made.record, self._state())
-            await self._send_places(operator, made)
-            await self._send(operator, made.items, made.record, (made.home_lat_deg, made.home_lon_deg, made.home_alt_m))
+            await self._uploads.places_of_plan(operator, made)
+            home = made.home_lat_deg, made.home_lon_deg, made.home_alt_m
+            await self._uploads.mission(operator, made.items, made.record, home)
         return self.state
 
     async def take_up(self, operator: Operator, body: TakeUpPlan) -> FlyState:
@@ -197,7 +191,7 @@ class FlightDesk:
             checked = await self._checked(operator, state)
             if (moved := checked.moved) is not None:
                 self._set_busy("Moving the heights to the vehicle's home")
-                await self._send(operator, moved.items, moved.record, moved.home)
+                await self._uploads.mission(operator, moved.items, moved.record, moved.home)
                 checked = await self._checked(operator, state, rereferenced_m=moved.shift_m)
             if vehicle != self._vehicle_id():
                 raise CheckNeededError("Another vehicle was adopted during the check.", advice="Press Check again.")
@@ -207,7 +201,7 @@ class FlightDesk:
             self._ready = Ready(checked, self._aboard.digest, vehicle, state, time.monotonic())
             if checked.certificate_json:
                 self._aboard.certified(checked.certificate_json)
-                await self._note()
+                await self._uploads.note()
         return self.state
 
     async def start(self, operator: Operator, body: StartFlight) -> None:
@@ -268,56 +262,16 @@ class FlightDesk:
 
     async def _put_on_board(self, operator: Operator, asked: AskedTakeUp, made: MadeTakeUp) -> None:
         """Only what was read back, and certified as such, is taken up."""
-        for kind, items in made.places.items():
+        if made.places:
             self._taking_up.sends(places=True)
-            self._lists_sent[kind] = items
-            report = await self._link.call(UploadPlaces(operator, kind, items, while_holding=True))
-            if not report.verified:
-                raise _not_verified(report, _LISTS[kind])
+            await self._uploads.places(operator, made.places, while_holding=True)
         home = (asked.state.home_lat_deg or 0.0, asked.state.home_lon_deg or 0.0, made.record.home_alt_dsm_m or 0.0)
         self._taking_up.sends(places=False)
-        found = await self._send(operator, made.items, made.record, home, while_holding=True)
+        found = await self._uploads.mission(operator, made.items, made.record, home, while_holding=True)
         self._set_busy("Certifying what is on board")
         self._aboard.certified(await self._taking_up.certificate(operator, asked, found))
-        await self._note()  # before: what fails here leaves it not taken up
+        await self._uploads.note()  # before: what fails here leaves it not taken up
         await self._taking_up.begin(operator, found.digest, made)
-
-    async def _send(
-        self,
-        operator: Operator,
-        items: tuple[Item, ...],
-        record: PlanRecord,
-        home: tuple[float, float, float],
-        *,
-        while_holding: bool = False,
-    ) -> OnboardMission:
-        report = await self._link.call(Upload(operator, items, *home, while_holding=while_holding))
-        if not report.verified:
-            raise _not_verified(report)
-        record = replace(record, digest=report.onboard.digest, t_utc_s=time.time())
-        self._aboard.read_back(onboard(record, len(report.onboard.items), report.rounded))
-        await self._note()
-        return report.onboard
-
-    async def _send_places(self, operator: Operator, made: MadeUpload) -> None:
-        """Before the mission, which counts as on board only with them. A list that the plan does not have is left as it
-        is, unless it is that of the plan before, or of one that was not taken up."""
-        for kind, items in made.places.items():
-            if not items and not await self._is_left_over(operator, kind, made.places_before[kind]):
-                continue
-            self._lists_sent[kind] = items
-            report = await self._link.call(UploadPlaces(operator, kind, items))
-            if not report.verified:
-                raise _not_verified(report, _LISTS[kind])
-
-    async def _is_left_over(self, operator: Operator, kind: PlaceList, before: tuple[Item, ...]) -> bool:
-        ours = [_marks(items) for items in (before, self._lists_sent.get(kind, ())) if items]
-        return bool(ours) and _marks(await self._link.call(DownloadPlaces(operator, kind))) in ours
-
-    async def _note(self) -> None:
-        """What is on board now, for the recorder and for the next server."""
-        self.tell_recorder()
-        await asyncio.to_thread(self._aboard.save)
 
     async def _checked(
         self, operator: Operator, state: VehicleState, *, rereferenced_m: float | None = None
@@ -385,20 +339,3 @@ def _check_firmware(record: PlanRecord, state: VehicleState) -> None:
             f"The plan was made for {FIRMWARES[record.firmware]}, the vehicle flies {FIRMWARES[state.autopilot]}.",
             advice="Choose the vehicle's own profile in Plan, then upload again.",
         )
-
-
-def _marks(items: tuple[Item, ...]) -> list[tuple[int, int, int]]:
-    """Alike for what was sent and for what a vehicle made of it."""
-    return [(item.command, round(item.lat_deg * 1e7), round(item.lon_deg * 1e7)) for item in items]
-
-
-_LISTS: dict[PlaceList, str] = {"fence": "fence", "rally": "list of rally points"}
-
-
-def _not_verified(report: UploadReport, what: str = "mission") -> TransferError:
-    first = report.differences[0] if report.differences else f"It answered, but holds another {what}."
-    more = f" ({len(report.differences) - 1} more such differences.)" if len(report.differences) > 1 else ""
-    return TransferError(
-        f"The vehicle does not hold the {what} that was sent: {first}{more}",
-        advice="Upload again. Do not start what is on board.",
-    )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from server.errors import NotCertifiedError, NotReadyError, StaleRevisionError
 from server.flying.check_task import Checked, check_start, climb_for_resuming, guided_targets
-from server.flying.upload_task import MadeUpload, make_upload
+from server.flying.uploading.upload_task import MadeUpload, make_upload
 from server.library import Library
 from server.library.documents import seen_in
 from server.library.terrain_of import FlownOver, terrain_of
