@@ -315,9 +315,10 @@ class Link:
             self.session.settle_ways(self.peers)
             if self._grace.wants_hold(self._server_age_s(), guided=self._is_guided, now_s=time.monotonic()):
                 self.spawn(self.session.hold())
-        if self.flight.status != self._told_flight:
-            self._told_flight = self.flight.status
-            self._publish(Topic.FLIGHT, self.flight.status)
+        flight = self.flight.status if self.session is None else self.session.pilot.status
+        if flight != self._told_flight:
+            self._told_flight = flight
+            self._publish(Topic.FLIGHT, flight)
         self._tell_avoidance()
         self._tell()
 

@@ -29,6 +29,7 @@ from telemetry.link.procedures import Accepted, Procedures, ReadParameters, Spaw
 from telemetry.mavlink.autopilot_orders import HOLD_MODES, MISSION_MODES
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of
+from telemetry.topics.messages import FlightStatus
 from telemetry.topics.onboard_lists import OnboardMission
 from telemetry.topics.requests import FlyManoeuvre, FlyWay, MayFlyManoeuvre, SetSpeed, StartAuto, StartGuided, TakeUp
 from telemetry.topics.vehicle import VehicleState
@@ -252,28 +253,49 @@ class Pilot:
             raise NotAllowedError("Nothing is being flown that could be paused.")
         await self._change_mode(*HOLD_MODES.get(state.autopilot, ("HOLD",)))
 
-    async def resume(self) -> None:
+    @property
+    def status(self) -> FlightStatus:
+        """Of the flight, with what ``resume`` would be refused with now."""
+        status = self.flight.status
+        if status.phase != "paused":
+            return status
+        try:
+            self._check_resumes()
+        except TelemetryError as error:
+            return replace(status, not_resumed=f"{error.what} {error.advice}".strip())
+        return status
+
+    def _check_resumes(self) -> None:
+        """Raises NotAllowedError and MissionUnknownError, by what is known without asking the vehicle."""
         self._under_way.check_home()
         if self.avoidance.is_engaged:
-            self.avoidance.resume()
             return
         if self.script_flies and self.script is not None:
             if self.script.ends_held:
                 raise NotAllowedError(self.script.ends_held, advice="Ask for another way, or return.")
             if self.script.is_flown:
                 raise NotAllowedError("The way is flown: nothing is paused.", advice="Ask for another one, or return.")
+            return
+        if not self.vehicle.state.armed or self.flight.status.way != "auto" or not self.flight.is_under_way:
+            raise NotAllowedError("There is no paused mission to go on with.", advice="Start the mission.")
+        if (self.join is None or self.join.is_done) and not self._under_way.must_be_read:
+            self._under_way.check_goes_on(self.vehicle.state)
+
+    async def resume(self) -> None:
+        self._check_resumes()
+        if self.avoidance.is_engaged:
+            self.avoidance.resume()
+            return
+        if self.script_flies and self.script is not None:
             self._tell_script(self.script.resume(time.monotonic()))
             return
-        state = self.vehicle.state
-        if not state.armed or self.flight.status.way != "auto" or not self.flight.is_under_way:
-            raise NotAllowedError("There is no paused mission to go on with.", advice="Start the mission.")
         join = self.join
         if join is not None and not join.is_done:
             await self._procedures.take_over(join.go_on)
             return
         if self._under_way.must_be_read:
             await self._read_mission()
-        self._under_way.check_goes_on(self.vehicle.state)
+            self._check_resumes()
         if self._under_way.started.begins is None:
             await self._check_goes_on()
         await self._procedures.take_over(self._mission_mode)

@@ -227,6 +227,8 @@ class FlightStatus:
     hint: str = ""
     is_flown: bool = False
     """All places were reached, and the vehicle holds at the last: nothing is left to be resumed."""
+    not_resumed: str = ""
+    """While it is paused: why Resume would be refused now, and what to do; empty: nothing stands against it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from telemetry.errors import NotAllowedError, RefusedError
 from telemetry.flight.guided.beginning import check_stands_there, home_elsewhere
 from telemetry.flight.guided.script_watches import HomeWatched
 from telemetry.flight.home_watch import CORRECTED_M, HomePlace, HomeWatch, home_of, is_there
+from telemetry.topics.messages import FlightStatus
 from telemetry.topics.requests import Resume, SetHome, StartAuto, StartGuided
 from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.bus_runs import run
@@ -49,8 +50,10 @@ def test_it_is_set_told_and_written_down_and_what_is_paused_does_not_go_on() -> 
             await until(lambda: is_home(bench, wanted))
             assert not [text for text in bench.texts if "Home has moved" in text], "it is our own order"
             assert [words for words in bench.commands if words.startswith("set home to")]
-            with pytest.raises(NotAllowedError, match="certified for the home before"):
+            with pytest.raises(NotAllowedError, match="certified for the home before") as refused:
                 await bench.handle(Resume(ME))
+            said = f"{refused.value.what} {refused.value.advice}"
+            await until(lambda: bench.last(FlightStatus).not_resumed == said)
 
     run(whole)
 
@@ -120,6 +123,7 @@ def test_a_px4_in_flight_refuses_in_its_own_words_and_its_mission_may_go_on() ->
             with pytest.raises(RefusedError, match="set home"):
                 await bench.handle(beside(bench.state, 25.0))
             assert not is_home(bench, beside(bench.state, 25.0))
+            await until(lambda: bench.last(FlightStatus).not_resumed == "")
             await bench.handle(Resume(ME))
             await until(lambda: bench.flight.phase == "flying")
 

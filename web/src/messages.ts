@@ -349,6 +349,7 @@ export interface FlightStatus {
   broke_off_at: number | null;
   hint: string;
   is_flown: boolean;
+  not_resumed: string;
 }
 
 /** ``value`` in few words, ``limit`` beside it; ``text`` a sentence where there is something to do or to know. */

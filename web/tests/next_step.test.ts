@@ -138,6 +138,17 @@ describe("the next step", () => {
     expect(nextStep(facts({ fly: checked(row("good")), check_age_s: 200 })).id).toBe("check");
   });
 
+  it("is no Resume where the link would refuse it, and says why in the link's own words", () => {
+    const flight = { ...phase("paused"), not_resumed: "Home lies elsewhere now. Return home, or land." };
+    const step = nextStep(facts({ flight, inAir: true }));
+    expect(step).toEqual({ id: "resume", why: flight.not_resumed });
+    const known = { unheard: null, hint: "", holder: null, isServerHeard: true };
+    expect(wordsBeside(step, known)).toEqual([flight.not_resumed]);
+    expect(nextStep(facts({ flight: { ...flight, not_resumed: "" }, inAir: true }))).toEqual({
+      id: "resume",
+    });
+  });
+
   it("in flight is pause, resume or waiting", () => {
     const fly = checked(row("good"));
     const inAir = true;

@@ -69,7 +69,8 @@ function inFlight(facts: Facts): Step | null {
   if (phase === "flying") return { id: "pause" };
   if (phase === "paused" && facts.flight?.is_flown) return { id: "wait", why: "Choose the next way" };
   if (phase === "paused") {
-    const why = resumeObstacle(facts.fly?.taken_up?.others, facts.othersAccepted);
+    const why =
+      facts.flight?.not_resumed || resumeObstacle(facts.fly?.taken_up?.others, facts.othersAccepted);
     return why === undefined ? { id: "resume" } : { id: "resume", why };
   }
   if (phase === "returning") return { id: "wait", why: "On the way home" };
