@@ -3,31 +3,40 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Sequence
 from typing import Literal
 
 import pytest
-from playwright.sync_api import FloatRect, Page, WebSocketRoute, expect
+from playwright.sync_api import FloatRect, Page, Route, WebSocketRoute, expect
 
 from server.schemas import (
+    FleetMessage,
+    HomeAskedDoc,
+    HomeMessage,
+    HomeState,
     LinkMessage,
     MeMessage,
     NodesMessage,
     ObstaclesMessage,
     PerceptionMessage,
+    ReasonDoc,
     RecorderMessage,
+    ReturnDoc,
     TextMessage,
     VehicleMessage,
 )
 from server.schemas.account_docs import MeDoc
 from server.schemas.flight_docs import NodeDoc
 from server.schemas.obstacle_docs import AlertDoc, ManoeuvreDoc, ObstaclesState
+from server.schemas.station_docs import VehicleDoc
 from server.schemas.strict_model import Message
 from telemetry.topics.messages import Candidate, LinkStatus, RecorderStatus, VehicleText
 from telemetry.topics.vehicle import VehicleState
 from tests.e2e.stations import Station
 from tests.e2e.steps import STREAM, visit
 from tests.server.obstacle_messages import alert, approach, obstacle, status
+from tests.server.station import ok
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
@@ -95,6 +104,53 @@ def test_nothing_sticks_out_of_panels_and_strip(station: Station, page: Page) ->
             if is_drawer:
                 opens.click()
                 expect(panel).not_to_be_in_viewport()
+
+
+BLOCKED = ReturnDoc(
+    state="not_certified",
+    reasons=[ReasonDoc(code=f"r{k}", text=f"Near place {k} it comes too low.", mend="Plan higher.") for k in range(9)],
+    judged_mono_s=10.0,
+)
+JUDGED = HomeAskedDoc(
+    id="h", is_here=True, lat_deg=37.7, lon_deg=15.0, alt_amsl_m=1700.0, moves_m=30.0, rises_m=2.0,
+    changes=["Return leads there, and every height counts from there."], ret=BLOCKED,
+)  # fmt: skip
+PAIR = FleetMessage(vehicles=[VehicleDoc(number=1, name="Bee"), VehicleDoc(number=2, name="Wasp")])
+
+
+@pytest.mark.parametrize("size", [(1366, 768), (390, 844)], ids=lambda size: f"{size[0]}x{size[1]}")
+def test_what_is_asked_of_home_is_seen_to_its_end_and_what_return_says_covers_no_vehicle(
+    station: Station, page: Page, size: tuple[int, int]
+) -> None:
+    ok(station.http.post("/api/terrains/demo"))
+    now_s = time.monotonic()
+    state = VehicleState(1, 1, armed=True, landed="in_air", mode="LOITER", heartbeat_t_mono_s=now_s)
+    hovers = VehicleMessage(source="live", now_mono_s=now_s, follow=None, state=state)
+    link, home = LinkMessage(link=LinkStatus(now_s, adopted=QUAD, state="live")), HomeMessage(home=HomeState())
+    sides = _with_messages(page, (link, hovers, PAIR, home))
+
+    def judged(route: Route) -> None:
+        sides[-1].send(HomeMessage(home=HomeState(asked=JUDGED)).model_dump_json())
+        route.fulfill(json=HomeState(asked=JUDGED).model_dump(mode="json"))
+
+    page.route("**/api/flight/home", judged)
+    page.route("**/api/flight/return", lambda route: route.fulfill(status=204))
+    visit(page, station)
+    page.get_by_test_id("tab-fly").click()
+    page.set_viewport_size({"width": size[0], "height": size[1]})
+    if page.get_by_test_id("drawer-left").is_visible():
+        page.get_by_test_id("drawer-left").click()
+    page.get_by_test_id("section-home").get_by_role("button", name="Home").first.click()
+    page.get_by_test_id("home-here").click()
+    expect(page.get_by_test_id("home-set")).to_be_in_viewport(ratio=1)
+    expect(page.get_by_test_id("home-drop")).to_be_in_viewport(ratio=1)
+
+    page.get_by_test_id("return-home").focus()
+    page.keyboard.down("Enter")
+    expect(page.get_by_test_id("outcome-safety")).to_contain_text("returns home")
+    page.keyboard.up("Enter")
+    said, fleet = page.evaluate(BOXES, ["outcome-safety", "fleet"])
+    assert not _overlap(said, fleet)
 
 
 LOST = (

@@ -1,3 +1,4 @@
+import { useEffect, useRef } from "preact/hooks";
 import { clearance, duration, metres } from "../format";
 import type { HomeAskedDoc, ReturnDoc } from "../messages";
 import { now_ms } from "../store/clock";
@@ -12,7 +13,7 @@ import { Icon } from "../ui/Icon";
 import { Done } from "../ui/Outcome";
 import { Section } from "../ui/Section";
 import { aimsFor } from "../vehicle/aiming";
-import { HOME, aimAtHome, askHome, putHomeAway, setHome } from "../vehicle/home_orders";
+import { HOME, aimAtHome, askHome, putHomeAway, setHome, takeAnswer } from "../vehicle/home_orders";
 import { returnAge_s, returnWords } from "../vehicle/return_words";
 
 /** The vehicle's own return: clear by how much, or what is in the way. */
@@ -47,11 +48,18 @@ function Return({ ret, isAnew = false }: { ret: ReturnDoc; isAnew?: boolean }) {
 
 function Asked({ asked }: { asked: HomeAskedDoc }) {
   const why = whyNotCommand.value;
+  const card = useRef<HTMLDivElement>(null);
+  useEffect(() => {
+    if (!takeAnswer()) return;
+    card.current?.scrollIntoView({ block: "nearest" });
+    // However long the judgement is, what is pressed next is in sight.
+    card.current?.lastElementChild?.scrollIntoView({ block: "nearest" });
+  }, [asked.id]);
   const rises_m = Math.abs(asked.rises_m);
   const height =
     rises_m < 0.05 ? "as high" : `${metres(rises_m, 1)} ${asked.rises_m > 0 ? "higher" : "lower"}`;
   return (
-    <div class="way-card home-card" role="group" aria-label="Home" data-testid="home-card">
+    <div ref={card} class="way-card home-card" role="group" aria-label="Home" data-testid="home-card">
       <strong class="way-verdict">
         <Icon name="home" size={16} /> {asked.is_here ? "Home here" : "Home there"}
         <span class="muted">

@@ -11,6 +11,8 @@ export type AimsFor = "way" | "home";
 interface Aim {
   what: AimsFor;
   then: (place: PlaceDoc) => void;
+  /** The drawer in which it was asked for: what comes of it appears there. */
+  from: typeof drawer.value;
 }
 
 const aiming = signal<Aim | null>(null);
@@ -24,7 +26,7 @@ export function aim(what: AimsFor, then: (place: PlaceDoc) => void): void {
     setSelection({ tool: "select" });
     if (isSame) return;
   }
-  aiming.value = { what, then };
+  aiming.value = { what, then, from: drawer.value };
   setSelection({ tool: "there", poi_id: null, fence_mark: null, place: null });
   // On narrow screens the drawer would cover what is to be clicked.
   drawer.value = null;
@@ -35,5 +37,7 @@ effect(() => {
   const asked = aiming.peek();
   if (tool === "there" || !asked) return;
   aiming.value = null;
-  if (place) asked.then(place);
+  if (!place) return;
+  drawer.value = asked.from;
+  asked.then(place);
 });

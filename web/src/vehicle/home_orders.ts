@@ -6,10 +6,21 @@ import { aim } from "./aiming";
 
 export const HOME = "home";
 
+/** This page waits for what it has asked: other pages, which are shown it as well, stay where they are. */
+let isAsked = false;
+
 /** Nothing is set yet: the place is judged, and shown to all pages. Without a place it is the vehicle's own. */
 export async function askHome(place: PlaceDoc | null = null): Promise<void> {
   const body: HomeBody = { place };
-  await order({ place: HOME, method: "PUT", path: "/api/flight/home", body });
+  isAsked = true;
+  if (!(await order({ place: HOME, method: "PUT", path: "/api/flight/home", body }))) isAsked = false;
+}
+
+/** True once after each question of this page. */
+export function takeAnswer(): boolean {
+  const wasAsked = isAsked;
+  isAsked = false;
+  return wasAsked;
 }
 
 export const aimAtHome = () => aim("home", (place) => void askHome(place));
