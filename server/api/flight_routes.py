@@ -46,6 +46,13 @@ async def take_up(body: TakeUpPlan, operator: InCharge, flying: Fly) -> Response
     return answer(await flying.desk.take_up(operator, body))
 
 
+@router.delete("/take_up", response_model=FlyState)
+async def cancel_take_up(operator: InCharge, flying: Fly) -> Response:
+    """Ends what is computed of a plan that is taken up, at once; the vehicle goes on holding. 409 where nothing is."""
+    del operator
+    return answer(flying.desk.cancel_take_up())
+
+
 @router.post("/start", **DONE)
 async def start(body: StartFlight, operator: InCharge, flying: Fly) -> None:
     """Flies the mission that was checked; 409 when the check is missing, old, or did not go well."""

@@ -16,9 +16,9 @@ from server.errors import CheckNeededError, ConflictError
 from server.flying.apart.other_vehicles import PENDING
 from server.flying.check_task import Checked
 from server.flying.checklist_desk import ChecklistDesk
-from server.flying.in_flight.take_up_desk import FIRMWARES, TakingUp, with_words
+from server.flying.in_flight.take_up_desk import TakingUp, with_words
 from server.flying.in_flight.take_up_task import AskedTakeUp, MadeTakeUp
-from server.flying.starting import Ready, check_goes_on, check_start, preflight_now
+from server.flying.starting import Ready, check_firmware, check_goes_on, check_start, preflight_now
 from server.flying.uploading.uploads import Uploads
 from server.flying.work import FlightWork
 from server.heard.channel import Channel
@@ -92,6 +92,7 @@ class FlightDesk:
             at_fence=self._at_fence,
             taken_up=None if self._taken_up is None else self._taken_up.model_copy(update={"others": self._others}),
             busy=self._busy,
+            can_cancel=self._taking_up.is_computing,
         )
 
     # What is heard
@@ -157,7 +158,7 @@ class FlightDesk:
         async with self._doing("Uploading"):
             self._ready = None
             made = await self._work.made_upload(revision, self._aboard.uploaded)
-            _check_firmware(made.record, self._state())
+            check_firmware(made.record, self._state())
             await self._uploads.places_of_plan(operator, made)
             home = made.home_lat_deg, made.home_lon_deg, made.home_alt_m
             await self._uploads.mission(operator, made.items, made.record, home)
@@ -174,13 +175,19 @@ class FlightDesk:
             taking.begin_try()
             try:
                 await taking.hold(operator)
-                self._set_busy("Finding the way into the plan")
-                asked, made = await taking.made(operator, body, self._set_busy)
+                async with taking.computing():
+                    self._set_busy("Finding the way into the plan")
+                    asked, made = await taking.made(operator, body, self._set_busy)
                 self._set_busy("Uploading")
                 await self._put_on_board(operator, asked, made)
             except DescribedError as error:
                 raise with_words(error, await taking.what_is_aboard(operator)) from error
             self._taken_up = made.doc
+        return self.state
+
+    def cancel_take_up(self) -> FlyState:
+        """While the way or the certificate is computed. Raises ConflictError otherwise."""
+        self._taking_up.cancel()
         return self.state
 
     async def check(self, operator: Operator) -> FlyState:
@@ -268,8 +275,11 @@ class FlightDesk:
         home = (asked.state.home_lat_deg or 0.0, asked.state.home_lon_deg or 0.0, made.record.home_alt_dsm_m or 0.0)
         self._taking_up.sends(places=False)
         found = await self._uploads.mission(operator, made.items, made.record, home, while_holding=True)
-        self._set_busy("Certifying what is on board")
-        self._aboard.certified(await self._taking_up.certificate(operator, asked, found))
+        async with self._taking_up.computing():
+            self._set_busy("Certifying what is on board")
+            certificate_json = await self._taking_up.certificate(operator, asked, found)
+        self._set_busy("Taking it up")
+        self._aboard.certified(certificate_json)
         await self._uploads.note()  # before: what fails here leaves it not taken up
         await self._taking_up.begin(operator, found.digest, made)
 
@@ -278,7 +288,7 @@ class FlightDesk:
     ) -> Checked:
         mission = await self._link.call(Download(operator))
         record = self._aboard.known_record(mission.digest)
-        _check_firmware(record, state)
+        check_firmware(record, state)
         return await self._work.checked(operator, record, mission, state, rereferenced_m)
 
     async def _start_request(
@@ -331,11 +341,3 @@ def _still_holds(ready: Ready, status: LinkStatus) -> bool:
         return True
     same = status.adopted is not None and status.adopted.id == ready.vehicle
     return same and status.mission_state == "verified" and status.mission_digest == ready.digest
-
-
-def _check_firmware(record: PlanRecord, state: VehicleState) -> None:
-    if state.autopilot != "other" and state.autopilot != record.firmware:
-        raise NotAllowedError(
-            f"The plan was made for {FIRMWARES[record.firmware]}, the vehicle flies {FIRMWARES[state.autopilot]}.",
-            advice="Choose the vehicle's own profile in Plan, then upload again.",
-        )

@@ -8,8 +8,11 @@ from dataclasses import dataclass
 from mapping.geometry.frames import apart_m
 from server.errors import CheckNeededError
 from server.flying.check_task import Checked
+from server.flying.in_flight.take_up_desk import FIRMWARES
 from server.schemas import CheckRow, PreflightDoc, StartFlight
 from server.schemas.flight_docs import CHECK_FRESH_S
+from telemetry.errors import NotAllowedError
+from telemetry.topics.messages import PlanRecord
 from telemetry.topics.obstacles import AvoidanceStatus
 from telemetry.topics.vehicle import VehicleState
 
@@ -93,3 +96,12 @@ def _place(state: VehicleState) -> tuple[float, float] | None:
     else:
         lat_deg, lon_deg = state.lat_deg, state.lon_deg
     return None if lat_deg is None or lon_deg is None else (lat_deg, lon_deg)
+
+
+def check_firmware(record: PlanRecord, state: VehicleState) -> None:
+    """Raises NotAllowedError for a plan of another autopilot."""
+    if state.autopilot != "other" and state.autopilot != record.firmware:
+        raise NotAllowedError(
+            f"The plan was made for {FIRMWARES[record.firmware]}, the vehicle flies {FIRMWARES[state.autopilot]}.",
+            advice="Choose the vehicle's own profile in Plan, then upload again.",
+        )

@@ -144,6 +144,8 @@ class FlyState(Strict):
     """Until it is flown."""
     busy: str = ""
     """What is being done right now: "Uploading", "Checking the start" ..."""
+    can_cancel: bool = False
+    """It computes, for a plan that is taken up: that can be cancelled."""
 
 
 class NodeDoc(Strict):

@@ -12,6 +12,8 @@ from playwright.sync_api import FloatRect, Page, Route, WebSocketRoute, expect
 
 from server.schemas import (
     FleetMessage,
+    FlyMessage,
+    FlyState,
     HomeAskedDoc,
     HomeMessage,
     HomeState,
@@ -27,7 +29,7 @@ from server.schemas import (
     VehicleMessage,
 )
 from server.schemas.account_docs import MeDoc
-from server.schemas.flight_docs import NodeDoc
+from server.schemas.flight_docs import NodeDoc, OnboardDoc
 from server.schemas.obstacle_docs import AlertDoc, ManoeuvreDoc, ObstaclesState
 from server.schemas.station_docs import VehicleDoc
 from server.schemas.strict_model import Message
@@ -151,6 +153,27 @@ def test_what_is_asked_of_home_is_seen_to_its_end_and_what_return_says_covers_no
     page.keyboard.up("Enter")
     said, fleet = page.evaluate(BOXES, ["outcome-safety", "fleet"])
     assert not _overlap(said, fleet)
+
+
+def test_what_is_computed_for_a_take_up_has_its_end_beside_it_and_nothing_moves(station: Station, page: Page) -> None:
+    link = LinkMessage(link=LinkStatus(10.0, adopted=QUAD, state="live"))
+    finds = FlyState(onboard=OnboardDoc(state="none"), busy="Finding the way into the plan")
+    sides = _with_messages(page, (link, FlyMessage(fly=finds)))
+    path = "**/api/flight/take_up"
+    page.route(path, lambda route: route.fulfill(json=finds.model_dump(mode="json")))
+    visit(page, station)
+    page.get_by_test_id("tab-fly").click()
+    footer, cancel = page.get_by_test_id("next-action"), page.get_by_test_id("take-up-cancel")
+    expect(footer).to_contain_text("Finding the way into the plan")
+    expect(cancel).to_have_count(0)
+    (before,) = page.evaluate(BOXES, ["next-action"])
+    sides[-1].send(FlyMessage(fly=finds.model_copy(update={"can_cancel": True})).model_dump_json())
+    expect(cancel).to_be_in_viewport(ratio=1)
+    assert page.evaluate(BOXES, ["next-action"]) == [before]
+    with page.expect_request(path) as asked:
+        cancel.press("Enter")
+    assert asked.value.method == "DELETE"
+    expect(cancel).to_be_enabled()
 
 
 LOST = (

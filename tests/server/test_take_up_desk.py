@@ -15,11 +15,19 @@ import pytest
 
 from planning.fence.fence_model import Fence, circle
 from planning.formats.fence_items import fence_items
-from server.errors import CheckNeededError, NotCertifiedError, NotReadyError, StaleRevisionError
+from server.errors import (
+    CheckNeededError,
+    ConflictError,
+    JobCancelledError,
+    NotCertifiedError,
+    NotReadyError,
+    StaleRevisionError,
+)
 from server.flying.apart.other_vehicles import PENDING
+from server.flying.in_flight import take_up_desk
 from server.heard.onboard import onboard
 from server.schemas import CheckRow, TakeUpPlan
-from server.work.jobs import Lane
+from server.work.jobs import Lane, Progress
 from telemetry.errors import NotAllowedError, SilentError, TransferError
 from telemetry.mavlink.items import wire_items
 from telemetry.topics.messages import FlightStatus
@@ -105,6 +113,53 @@ def test_it_is_held_put_on_board_certified_and_taken_up(
         assert bench.aboard.record is not None
         assert bench.aboard.record.taken_up
         assert bench.aboard.record.certificate_json
+
+    runner.run(scenario())
+
+
+def never_ends(*_: object, report: Progress) -> None:
+    report("Finding the way into the plan", None)
+    while True:
+        time.sleep(60.0)
+
+
+@pytest.mark.parametrize("step", ["make_take_up", "check_take_up"])
+def test_what_is_computed_of_it_is_cancelled_at_once_and_its_process_ended(
+    made: Made,
+    lanes: tuple[Lane, Lane],
+    runner: asyncio.Runner,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    step: str,
+) -> None:
+    async def scenario() -> None:
+        bench = await flown(made, tmp_path, lanes)
+        with pytest.raises(ConflictError, match="Nothing is being computed"):
+            bench.desk.cancel_take_up()
+        monkeypatch.setattr(take_up_desk, step, never_ends)
+        lane = lanes[step == "check_take_up"]
+        taking = asyncio.ensure_future(bench.desk.take_up(ME, TakeUpPlan(revision=3)))
+        async with asyncio.timeout(60.0):
+            while not (bench.desk.state.can_cancel and lane.running):
+                await asyncio.sleep(0.02)
+        assert bench.told[-1].can_cancel
+        worker = lane._worker
+        assert worker is not None
+        bench.desk.cancel_take_up()
+        with pytest.raises(JobCancelledError, match="was cancelled") as refused:
+            async with asyncio.timeout(5.0):
+                await taking
+        before = "The vehicle holds, and the mission before is still on board: Resume flies that."
+        assert refused.value.advice.startswith("The vehicle holds")
+        assert (refused.value.advice == before) is (step == "make_take_up")
+        async with asyncio.timeout(5.0):
+            while worker.alive():
+                await asyncio.sleep(0.02)
+        assert (bench.desk.state.busy, bench.desk.state.can_cancel) == ("", False)
+        assert TakeUp not in map(type, bench.vehicle.told)
+        monkeypatch.undo()
+        state = await bench.desk.take_up(ME, TakeUpPlan(revision=3))
+        assert state.taken_up is not None, "and it can be tried again"
 
     runner.run(scenario())
 

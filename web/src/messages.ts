@@ -1568,6 +1568,8 @@ export interface FlyState {
   taken_up: TakenUpDoc | null;
   /** What is being done right now: "Uploading", "Checking the start" ... */
   busy: string;
+  /** It computes, for a plan that is taken up: that can be cancelled. */
+  can_cancel: boolean;
 }
 
 export interface NodeDoc {

@@ -74,6 +74,7 @@ export function flyState(fields: Partial<FlyState> = {}): FlyState {
     at_fence: "",
     taken_up: null,
     busy: "",
+    can_cancel: false,
     ...fields,
   };
 }

@@ -4,14 +4,15 @@ what came on board is judged once more before it is the mission that ``resume`` 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
 
 from planning.errors import DescribedError
 from planning.missions.vehicle_profile import parse_profile
-from server.errors import NotReadyError
+from server.errors import ConflictError, JobCancelledError, NotReadyError
 from server.flying.in_flight.take_up_task import AskedTakeUp, MadeTakeUp, check_take_up, make_take_up
 from server.flying.work import check_uploadable
 from server.heard.channel import Channel
@@ -73,12 +74,36 @@ class TakingUp:
     ) -> None:
         self._link, self._live, self._workspace, self._library = link, live, workspace, library
         self._lane, self._watch, self._aboard = lane, watch, aboard
+        self._until: asyncio.Timeout | None = None
+        """Of what is being computed; None: nothing is."""
         self.forget()
 
     def forget(self) -> None:
         """Another flight, or what is on board is flown: no try that failed counts any more."""
         self._before: Before | None = None
         self._sent: Literal["nothing", "mission", "places"] = "nothing"
+
+    @property
+    def is_computing(self) -> bool:
+        return self._until is not None
+
+    @contextlib.asynccontextmanager
+    async def computing(self) -> AsyncIterator[None]:
+        """``cancel`` ends what is done in it, and the process that does it, with JobCancelledError."""
+        try:
+            async with asyncio.timeout(None) as self._until:
+                yield
+        except TimeoutError:
+            raise JobCancelledError("Taking up the plan was cancelled.") from None
+        finally:
+            self._until = None
+
+    def cancel(self) -> None:
+        """Raises ConflictError where nothing is being computed: what was sent to the vehicle is not called back."""
+        if self._until is None:
+            what = "Nothing is being computed that could be cancelled."
+            raise ConflictError(what, advice="See what is on board; return home or land at any time.")
+        self._until.reschedule(asyncio.get_running_loop().time())
 
     def check_flies(self) -> None:
         state = self._state()

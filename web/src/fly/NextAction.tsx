@@ -17,11 +17,13 @@ import { pending } from "../store/outcomes";
 import { failed, whyUnheard } from "../store/reach";
 import { Button } from "../ui/Button";
 import { HoldButton } from "../ui/HoldButton";
-import { Outcome } from "../ui/Outcome";
+import { ErrorBox, Outcome } from "../ui/Outcome";
 import {
   accepted,
+  CANCEL,
   adopt,
   areOthersAccepted,
+  cancelTakeUp,
   checkStart,
   LEASE,
   NEXT,
@@ -119,6 +121,20 @@ function Primary({ step, isCut }: { step: Step; isCut: boolean }) {
   }
 }
 
+/** Beside what it ends: nothing moves when it comes and goes. */
+function Cancel({ isCut }: { isCut: boolean }) {
+  if (!fly.value?.can_cancel) return null;
+  return (
+    <Button
+      icon="cross"
+      disabled={isCut || pending.value.has(CANCEL)}
+      title="Cancel: the vehicle goes on holding"
+      testid="take-up-cancel"
+      onClick={() => void cancelTakeUp()}
+    />
+  );
+}
+
 /** After the landing, the short way to what was flown. */
 function LastFlight() {
   const phase = flight.live.value?.phase;
@@ -194,8 +210,12 @@ export function NextAction() {
         </p>
       ))}
       {isObserver.value && <p class="muted action-hint">{notInCharge.value}.</p>}
+      <ErrorBox place={CANCEL} />
       <Changes>
-        <Primary step={step} isCut={cut !== null} />
+        <div class="next-row">
+          <Primary step={step} isCut={cut !== null} />
+          <Cancel isCut={cut !== null} />
+        </div>
       </Changes>
     </footer>
   );

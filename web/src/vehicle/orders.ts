@@ -116,6 +116,12 @@ export async function takeUpPlan(acceptsBattery: boolean): Promise<void> {
   if (answer) say(NEXT, "The new plan is on board, certified from here. Resume flies it.");
 }
 
+/** Of its own: the order that is cancelled is still being waited for. */
+export const CANCEL = "take_up_cancel";
+
+export const cancelTakeUp = () =>
+  order({ place: CANCEL, method: "DELETE", path: "/api/flight/take_up", moves: true });
+
 export const checkStart = () => order({ place: NEXT, path: "/api/flight/check" });
 
 export async function startFlight(): Promise<void> {
