@@ -160,7 +160,9 @@ class Flying:
             link, work, aboard, checklist, workspace, self.live, self._watch, bus, present, taking_up, is_alone=alone
         )
         self.ways = WayDesk(link, self.live, workspace, library, lane, self._watch, present)
-        self.home = HomeDesk(link, self.live, self.ways, lane, present, lease.server_operator, self.desk.on_home_set)
+        self.home = HomeDesk(
+            link, self.live, self.ways, lane, present, lease.server_operator, self.desk.on_home_set, self._on_text
+        )
         name = "" if alone else wanted.name
         self.parameters = ParameterDesk(link, self.live, aboard, library.root, self._on_parameters, name)
         self.recording = Recording(number, recordings, shared.shelf, self.nodes, present)

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
+
 from server.heard.channel import Channel
 from server.heard.onboard import Aboard
 from server.library import Library
@@ -18,6 +22,21 @@ def seen_maps(watch: Watch) -> tuple[Voxels, ...]:
     """What each sensor has seen. They may be large: for a thread."""
     mirrors = [watch.mirrors[sensor] for sensor in SENSORS]
     return tuple(mirror.voxels() for mirror in mirrors if mirror.origin is not None)
+
+
+def maps_revision(watch: Watch) -> tuple[tuple[str, int, int], ...]:
+    """Another one: a map is another. Known without looking into them."""
+    mirrors = [watch.mirrors[sensor] for sensor in SENSORS]
+    return tuple((mirror.sensor, mirror.generation, mirror.revision) for mirror in mirrors if mirror.origin is not None)
+
+
+def is_same_seen(one: Sequence[Voxels], other: Sequence[Voxels]) -> bool:
+    """Whether both hold the same things that the surface model does not explain. They may be large: for a thread."""
+    return len(one) == len(other) and all(
+        (a.sensor, a.origin, a.resolution_m) == (b.sensor, b.origin, b.resolution_m)
+        and np.array_equal(a.keys[~a.explained], b.keys[~b.explained])
+        for a, b in zip(one, other, strict=True)
+    )
 
 
 class Surroundings:

@@ -13,19 +13,22 @@ import pytest
 
 from mapping.geometry.frames import moved_deg
 from server.errors import CheckNeededError, ConflictError, NotFoundError
+from server.flying.in_flight import home_desk
 from server.flying.in_flight.home_desk import HomeDesk
 from server.flying.in_flight.way_desk import WayDesk
 from server.heard.channel import Channel
-from server.schemas import HomeAskedDoc, HomeBody, HomeState, SetHomeBody
+from server.scene.mirror import MapMirror
+from server.schemas import HomeAskedDoc, HomeBody, HomeState, ReturnDoc, SetHomeBody
 from server.schemas.flight_docs import CHECK_FRESH_S
 from server.work.jobs import Lane
 from telemetry.errors import NotAllowedError
 from telemetry.flight.home_watch import home_of
-from telemetry.topics.obstacles import SENSORS
+from telemetry.topics.obstacles import SENSORS, MapOrigin
 from telemetry.topics.requests import SetHome
 from telemetry.topics.vehicle import VehicleState
 from tests.server.fakes import Told
 from tests.server.flying_desk_bench import ME, Made, Vehicle
+from tests.server.obstacle_messages import delta
 
 pytestmark = pytest.mark.xdist_group("flying-desk")
 
@@ -69,7 +72,10 @@ class Bench:
         self.mirrors: dict[str, Any] = {name: SimpleNamespace(origin=None) for name in SENSORS}
         ways = WayDesk(me.vehicle, self.live, me, made.library, lane, me, Told())
         self.sets = 0
-        self.desk = HomeDesk(me.vehicle, self.live, ways, lane, me, lambda: ME, self.home_set)
+        self.said: list[str] = []
+        self.desk = HomeDesk(
+            me.vehicle, self.live, ways, lane, me, lambda: ME, self.home_set, lambda text: self.said.append(text.text)
+        )
 
     def home_set(self) -> None:
         self.sets += 1
@@ -255,6 +261,77 @@ def test_a_return_is_judged_by_what_the_vehicle_holds_now_and_its_verdict_is_gon
             assert [reason.text for reason in bench.desk.state.ret.reasons] == ["Home has moved again."]
         finally:
             judging.cancel()
+
+    runner.run(scenario())
+
+
+def test_a_certified_return_is_judged_again_where_sensors_see_something_in_its_way_and_that_is_said(
+    made: Made, lane: Lane, runner: asyncio.Runner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scenario() -> None:
+        monkeypatch.setattr(home_desk, "NEW_MAP_S", 0.0)
+        monkeypatch.setattr(home_desk, "LOOK_EVERY_S", 0.02)
+        bench, radar = Bench(made, lane), MapMirror("radar")
+        bench.mirrors["radar"] = radar
+        home = home_of(bench.state)
+        assert home is not None
+        origin = MapOrigin(home.lat_deg, home.lon_deg, home.alt_amsl_m)
+        # Far from the way home, and a mast on it that is higher than the return.
+        aside = [(-300, -300, up) for up in range(4)]
+        mast = [(east, north, up) for east in (9, 10) for north in (-1, 0) for up in range(80)]
+        radar.fold(delta(aside, whole=True, revision=1, origin=origin, resolution_m=1.0))
+        judging = asyncio.ensure_future(bench.desk.run())
+        try:
+            bench.desk.on_state(bench.state)
+            bench.moves(20.0)
+            await shows(lambda: bench.desk.state.ret)
+            first = bench.desk.state.ret
+            assert first is not None
+            assert first.state == "certified", first.reasons
+            told = len(bench.told)
+            radar.fold(delta(aside, probability=250, since=1, revision=2, origin=origin, resolution_m=1.0))
+            await shows(lambda: bench.desk._judged and bench.desk._judged.maps[0][2] == 2)
+            assert (bench.desk.state.ret, len(bench.told)) == (first, told), "it is the same that is seen"
+            radar.fold(delta(mast, since=2, revision=3, origin=origin, resolution_m=1.0))
+            await shows(lambda: bench.desk.state.ret != first)
+            second = bench.desk.state.ret
+            assert second is not None
+            assert second.state == "not_certified"
+            assert second.judged_mono_s > first.judged_mono_s
+            (said,) = bench.said
+            assert said.startswith("The vehicle's return was certified, and is not any more: ")
+            assert second.reasons[0].text in said
+            radar.clear()
+            await shows(lambda: bench.desk.state.ret not in (None, second))
+            assert bench.desk.state.ret is not None
+            assert (bench.desk.state.ret.state, len(bench.said)) == ("certified", 1)
+        finally:
+            judging.cancel()
+
+    runner.run(scenario())
+
+
+def test_what_looks_all_the_time_has_it_judged_seldom(
+    made: Made, lane: Lane, runner: asyncio.Runner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scenario() -> None:
+        bench, now_s = Bench(made, lane), time.monotonic()
+        ret = ReturnDoc(state="certified", reasons=[], judged_mono_s=now_s)
+        home = home_of(bench.state)
+        assert home is not None
+        bench.desk._gathered = await WayDesk.asked(bench.desk._ways, ME, home_desk.ANYWHERE)
+        bench.desk._judged = home_desk._Judged(home, (0.0, 0.0), ret, (("radar", 1, 1),), took_s=4.0)
+        looks = list[float]()
+
+        async def seen(_: object) -> bool:
+            looks.append(time.monotonic())
+            return True
+
+        monkeypatch.setattr(bench.desk._ways, "has_seen_other", seen)
+        for later_s, due in ((4.0, False), (11.0, False), (12.5, True)):
+            monkeypatch.setattr(time, "monotonic", lambda at_s=now_s + later_s: at_s)
+            assert await bench.desk._is_seen_otherwise() is due
+        assert looks == [now_s + 12.5]
 
     runner.run(scenario())
 

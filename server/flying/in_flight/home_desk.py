@@ -35,6 +35,7 @@ from server.work.jobs import Lane
 from telemetry.bus.link_client import LinkClient
 from telemetry.flight.home_watch import HomePlace, home_of, home_of_takeoff, is_there
 from telemetry.mavlink.believing import is_in_the_air
+from telemetry.topics.messages import VehicleText
 from telemetry.topics.requests import Operator, SetHome
 from telemetry.topics.vehicle import VehicleState
 
@@ -46,6 +47,12 @@ FLOWN_M, OLD_S, OLDEST_S = 10.0, 15.0, 60.0
 take-off: sensors see more meanwhile."""
 MOVED_M = 2.0
 """A vehicle that was moved further is not "here" any more."""
+NEW_MAP_S, PAUSE_SHARE = 5.0, 3.0
+"""A return is judged again so soon where sensors have seen other things, and once so many times as long as a judgement
+takes have passed: what looks all the time keeps no processor busy all the time."""
+CRITICAL = 2
+"""MAV_SEVERITY"""
+NO_MORE = "The vehicle's return was certified, and is not any more"
 HOME_MOVED_AGAIN = "Home has moved again."
 LOOK_EVERY_S = 1.0
 
@@ -57,6 +64,9 @@ class _Judged:
     home: HomePlace
     at_deg: tuple[float, float]
     doc: ReturnDoc
+    maps: tuple[tuple[str, int, int], ...]
+    """Revision of the maps, before they were looked into."""
+    took_s: float
 
 
 class HomeDesk:
@@ -71,15 +81,18 @@ class HomeDesk:
         pages: Pages,
         server: Callable[[], Operator],
         home_set: Callable[[], None],
+        say: Callable[[VehicleText], None],
     ) -> None:
         """``ways``: gathers what is judged by; ``server``: in whose name it is asked for without a pilot; ``home_set``:
-        home was, or may have been, set by order."""
+        home was, or may have been, set by order; ``say``: to all pages, at once."""
         self._link, self._live, self._ways, self._lane, self._pages = link, live, ways, lane, pages
-        self._server, self._home_set = server, home_set
+        self._server, self._home_set, self._say = server, home_set, say
         self._asked: HomeAskedDoc | None = None
         self._asked_mono_s = 0.0
         self._is_judging = self._is_judging_return = False
         self._judged: _Judged | None = None
+        self._holds = False
+        """The return was certified when it was last judged."""
         self._heard: HomePlace | None = None
         """Home that was heard first in this flight."""
         self._adopted: str | None = None
@@ -147,6 +160,7 @@ class HomeDesk:
         if not (state.armed and is_in_the_air(state)) or home is None:
             if not state.armed and (self._heard or self._gathered) is not None:
                 self._judged = self._heard = self._gathered = None
+                self._holds = False
                 self._tell()
             return
         self._heard = self._heard or home_of_takeoff(self._live.track.states) or home
@@ -175,6 +189,7 @@ class HomeDesk:
     def forget(self) -> None:
         """Another vehicle, or none."""
         self._asked = self._judged = self._heard = self._gathered = None
+        self._holds = False
         self._moved.clear()
         self._tell()
 
@@ -185,7 +200,7 @@ class HomeDesk:
                 async with asyncio.timeout(LOOK_EVERY_S):
                     await self._moved.wait()
             except TimeoutError:
-                if not self._is_due():
+                if not (self._is_due() or await self._is_seen_otherwise()):
                     continue
             self._moved.clear()
             await self._judge_return()
@@ -222,12 +237,30 @@ class HomeDesk:
             return True
         return judged.doc.state == "unknown" or apart_m(judged.at_deg, (state.lat_deg, state.lon_deg)) > FLOWN_M
 
+    async def _is_seen_otherwise(self) -> bool:
+        """Whether sensors have seen other things since. Heavy looks are made in threads, and seldom."""
+        judged, asked, maps = self._judged, self._gathered, self._ways.maps_revision
+        if judged is None or asked is None or maps == judged.maps:
+            return False
+        if time.monotonic() - judged.doc.judged_mono_s < max(NEW_MAP_S, PAUSE_SHARE * judged.took_s):
+            return False
+        try:
+            if await self._ways.has_seen_other(asked):
+                return True
+        except Exception as error:
+            reported(error, _log, "Comparing what was seen")
+            return True
+        if self._judged is judged:
+            self._judged = replace(judged, maps=maps)
+        return False
+
     async def _judge_return(self) -> None:
         state = self._live.state
         home = None if state is None else home_of(state)
         if state is None or home is None:
             return
         self._is_judging_return, vehicle = True, self._adopted
+        maps, began_s = self._ways.maps_revision, time.monotonic()
         self._tell()
         try:
             doc = await self._judged_return()
@@ -242,10 +275,21 @@ class HomeDesk:
             self._is_judging_return = False
         now = self._live.state
         if now is not None and now.armed and vehicle == self._adopted:
-            self._judged = _Judged(home, (state.lat_deg or 0.0, state.lon_deg or 0.0), doc)
+            at_deg, took_s = (state.lat_deg or 0.0, state.lon_deg or 0.0), time.monotonic() - began_s
+            self._judged = _Judged(home, at_deg, doc, maps, took_s)
+            self._say_if_lost(doc)
             if not is_there(here := home_of(now), home):
                 self._out_of_date(here or home, HOME_MOVED_AGAIN)
         self._tell()
+
+    def _say_if_lost(self, doc: ReturnDoc) -> None:
+        held, self._holds = self._holds, doc.state == "certified"
+        if not held or self._holds:
+            return
+        first = doc.reasons[0] if doc.reasons else None
+        why = "." if first is None else f": {first.text} {first.mend}".rstrip()
+        instead = " A way home is certified: Guided flight, Home." if doc.instead else ""
+        self._say(VehicleText(time.time(), CRITICAL, f"{NO_MORE}{why}{instead}"))
 
     async def _judged_return(self) -> ReturnDoc:
         asked = self._gathered or await self._ways.asked(self._server(), ANYWHERE)

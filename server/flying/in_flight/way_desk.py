@@ -15,7 +15,7 @@ from server.flying.in_flight.way_task import WayAsked, WayJudged, judge_way
 from server.heard.channel import Channel, ShownWay
 from server.library import Library
 from server.obstacles.obstacle_watch import Watch
-from server.obstacles.surroundings import seen_maps
+from server.obstacles.surroundings import is_same_seen, maps_revision, seen_maps
 from server.schemas import (
     FlyWayBody,
     GuidedMessage,
@@ -191,6 +191,15 @@ class WayDesk:
             flown=flown_places(self._live.track.states),
             took_off=home_of_takeoff(self._live.track.states),
         )
+
+    @property
+    def maps_revision(self) -> tuple[tuple[str, int, int], ...]:
+        """Another one: what sensors have seen may be another."""
+        return maps_revision(self._watch)
+
+    async def has_seen_other(self, asked: WayAsked) -> bool:
+        """Whether sensors have seen other things by now than ``asked`` is judged by."""
+        return not await asyncio.to_thread(lambda: is_same_seen(asked.maps, seen_maps(self._watch)))
 
     # How
 
