@@ -147,6 +147,11 @@ class Certificate:
         return self.min_distance_m if math.isnan(low_m) else min(self.min_distance_m, low_m)
 
     @property
+    def spare_m(self) -> float:
+        """Of what is kept, what is not required."""
+        return max(0.0, self.kept_m - self.required_clearance_m)
+
+    @property
     def following_m(self) -> float:
         """Radius of the tube around the line that is proved."""
         return 0.0 if self.budget is None else self.budget.value_m("following")

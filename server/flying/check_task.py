@@ -68,6 +68,8 @@ class Checked:
     """That the profile counts on."""
     not_guided: str = ""
     """Why waypoints cannot be handed over one at a time: the line is followed less closely then. Empty: they can."""
+    guided_spare_m: float | None = None
+    """Clearance beyond what handing them over needs, by which home's height may change meanwhile; None: not judged."""
     at_fence: str = ""
     """What the vehicle does when it crosses its fence; empty: not read."""
     returns: ReturnSpeeds = field(default_factory=ReturnSpeeds)
@@ -123,6 +125,7 @@ def check_start(
         speeds,
         braking,
         not_guided="" if found.certificate is None else _not_guided(record, found.certificate),
+        guided_spare_m=None if found.certificate is None else _guided_spare_m(record, found.certificate),
         at_fence=at_fence(parameters, record.firmware),
         returns=return_speeds(parameters, record.firmware),
     )
@@ -130,14 +133,23 @@ def check_start(
 
 def _not_guided(record: PlanRecord, certificate: Certificate) -> str:
     """Another way of flying is another term for following the line; it is judged from where the vehicle may stand."""
-    demands = demands_from_doc(PlanDoc.model_validate_json(record.plan_json))
-    required_m = replace(demands, way="guided").clearance().required_clearance_m
+    required_m = _guided_required_m(record)
     if certificate.kept_m >= required_m:
         return ""
     return (
         f"The line keeps {rounded_down(certificate.kept_m)} m; handed over one at a time it needs"
         f" {rounded_up(required_m)} m, because the vehicle follows it less closely."
     )
+
+
+def _guided_spare_m(record: PlanRecord, certificate: Certificate) -> float:
+    """Infinite over nothing that is near."""
+    return max(0.0, certificate.kept_m - _guided_required_m(record))
+
+
+def _guided_required_m(record: PlanRecord) -> float:
+    demands = demands_from_doc(PlanDoc.model_validate_json(record.plan_json))
+    return replace(demands, way="guided").clearance().required_clearance_m
 
 
 def guided_targets(record: PlanRecord, *, report: Progress) -> GuidedPlan:

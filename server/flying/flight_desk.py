@@ -303,7 +303,8 @@ class FlightDesk:
                 advice = "Choose GUIDED under Required clearance in Plan and upload again, or fly in AUTO."
                 raise NotAllowedError(ready.checked.not_guided, advice=advice)
             plan = await self._work.guided(record)
-            return StartGuided(operator, plan.targets, plan.takeoff_alt_rel_home_m, end=plan.end)
+            spare_m = ready.checked.guided_spare_m
+            return StartGuided(operator, plan.targets, plan.takeoff_alt_rel_home_m, end=plan.end, spare_m=spare_m)
         if body.from_item == 1:
             return StartAuto(operator, body.digest)
         from_item, climb_to_m = await self._work.way_back(record, ready.checked, body.from_item)

@@ -141,7 +141,9 @@ def _start_request(prepared: Prepared, options: FlyOptions) -> StartAuto | Start
     if options.way == "auto":
         return StartAuto(options.operator, digest)
     script = guided_plan(prepared.mission, speed_m_s=options.profile.max_speed_m_s)
-    return StartGuided(options.operator, script.targets, script.takeoff_alt_rel_home_m, end=script.end)
+    spare_m = None if (proof := prepared.preflight.certificate) is None else proof.spare_m
+    takeoff_m = script.takeoff_alt_rel_home_m
+    return StartGuided(options.operator, script.targets, takeoff_m, end=script.end, spare_m=spare_m)
 
 
 class _Watcher:

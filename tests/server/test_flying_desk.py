@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -85,6 +86,10 @@ def test_a_flight_from_upload_to_start(
         assert isinstance(script, StartGuided)
         assert len(script.targets) > 5
         assert script.targets[-1].t_s is not None
+        proof = json.loads(bench.records[-1].certificate_json)
+        assert script.spare_m is not None
+        # What handing over needs is never less than what the plan's own way of flying does.
+        assert 0.0 < script.spare_m <= proof["min_distance_m"] - proof["required_clearance_m"]
 
         bench.desk.on_disarmed()
         assert bench.desk.state.preflight is None

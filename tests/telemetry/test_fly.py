@@ -86,8 +86,10 @@ def test_what_is_flown_is_put_on_record() -> None:
 
 def test_guided() -> None:
     pilot = Pilot(SmallBus())
-    flown(pilot, replace(OPTIONS, way="guided"))
-    start = pilot.of(StartGuided)[0]
+    result, _ = flown(pilot, replace(OPTIONS, way="guided"))
+    start, proof = pilot.of(StartGuided)[0], result.preflight.certificate
+    assert proof is not None
+    assert start.spare_m == proof.kept_m - proof.required_clearance_m > 0.0
     assert [target.item for target in start.targets] == [2, 3, 4]
     assert start.takeoff_alt_rel_home_m == pytest.approx(20.0)
     assert start.end == "rtl"
