@@ -28,7 +28,7 @@ from telemetry.flight.preflight.preflight import actual_home
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.requests import FlyWay, Operator, StartGuided
-from telemetry.topics.vehicle import VehicleState
+from telemetry.topics.vehicle import HomePlace, VehicleState
 
 NO_ITEM = 0
 
@@ -157,9 +157,9 @@ def _at_worse_end(flown: Flown) -> ClearanceParams:
 
 
 def way_request(
-    operator: Operator, way: GuidedWay, wish: Wish, *, speed_m_s: float, most_m_s: float
+    operator: Operator, way: GuidedWay, wish: Wish, home: HomePlace | None, *, speed_m_s: float, most_m_s: float
 ) -> StartGuided | FlyWay:
-    """What flies a way that may be flown."""
+    """What flies a way that may be flown, from the ``home`` that it was judged for."""
     targets = tuple(
         GuidedTarget(NO_ITEM, lat_deg, lon_deg, up_m, speed_m_s, heading_rad=_heading(wish, (lat_deg, lon_deg)))
         for lat_deg, lon_deg, up_m in way.places[1:]
@@ -170,7 +170,7 @@ def way_request(
         begins, up_m = {"begins_lat_deg": lat_deg, "begins_lon_deg": lon_deg}, way.places[-1][2]
         return StartGuided(operator, targets, up_m, end="hold", spare_m=spare_m, **begins)
     end = "land" if isinstance(wish, RETURNS) else "hold"
-    return FlyWay(operator, targets, *way.places[0], most_m_s, end=end, spare_m=spare_m)
+    return FlyWay(operator, targets, *way.places[0], most_m_s, end=end, spare_m=spare_m, home=home)
 
 
 def _heading(wish: Wish, at_deg: tuple[float, float]) -> float | None:

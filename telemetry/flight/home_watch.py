@@ -5,28 +5,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-from mapping.geometry.frames import offset_m
+from mapping.geometry.frames import apart_m, offset_m
 from telemetry.mavlink.believing import is_in_the_air
+from telemetry.topics.vehicle import HomePlace as HomePlace
 from telemetry.topics.vehicle import VehicleState
 
 MOVED_M, ROSE_M = 1.0, 0.5
 """Less is what receivers and barometers wander, and autopilots follow."""
 CORRECTED_M = 2.0
 """Up to here PX4 may correct home's height in flight, by its receiver: 1.2 m were measured."""
+UNSEEN_M = 0.3
+"""What receivers wander, whatever a way has to spare."""
 EIGHTHS = ("north", "north-east", "east", "south-east", "south", "south-west", "west", "north-west")
 WHAT_TO_DO = (
     "The ways home are certified for the home before. Hold, then certify the rest from here (Fly, On board),"
     " or set home back; do not rely on Return until then."
 )
-
-
-@dataclass(frozen=True, slots=True)
-class HomePlace:
-    lat_deg: float
-    lon_deg: float
-    alt_amsl_m: float
 
 
 def home_of(state: VehicleState) -> HomePlace | None:
@@ -50,6 +45,18 @@ def is_there(home: HomePlace | None, wanted: HomePlace) -> bool:
     return home is not None and moved_words(wanted, home) is None
 
 
+def is_within(home: HomePlace, certified: HomePlace, up_m: float) -> bool:
+    """What counts its heights from ``certified`` may be flown: home lies there, and no more than ``up_m`` off in
+    height."""
+    away_m = apart_m((certified.lat_deg, certified.lon_deg), (home.lat_deg, home.lon_deg))
+    return away_m <= MOVED_M and abs(home.alt_amsl_m - certified.alt_amsl_m) <= up_m
+
+
+def spare_up_m(spare_m: float | None) -> float:
+    """By how much home's height may be another one for a way that has so much clearance to spare; None: not known."""
+    return math.inf if spare_m is None else max(UNSEEN_M, spare_m)
+
+
 def follows_m(state: VehicleState) -> float:
     """By how much the autopilot may correct home's height in flight."""
     return CORRECTED_M if state.autopilot == "px4" else ROSE_M
@@ -69,10 +76,7 @@ class HomeWatch:
     def is_elsewhere(self) -> bool:
         """Farther away than the autopilot itself corrects it."""
         home, before = self._home, self._certified
-        if home is None or before is None:
-            return False
-        away_m = math.hypot(*offset_m((before.lat_deg, before.lon_deg), home.lat_deg, home.lon_deg))
-        return not (away_m <= MOVED_M and abs(home.alt_amsl_m - before.alt_amsl_m) <= self._follows_m)
+        return home is not None and before is not None and not is_within(home, before, self._follows_m)
 
     def expect(self, ordered: HomePlace | None) -> None:
         """Home that comes there moves by our own order; None: nothing is ordered."""

@@ -301,7 +301,7 @@ class Answering:
     async def _fly_rest(self, request: requests.FlyRest) -> None:
         pilot = self._link.need_session().pilot
         await self._record(request, f"fly the rest at its proper height, {len(request.targets)} places")
-        pilot.avoidance.fly_rest(request)
+        pilot.fly_rest(request)
 
     async def _set_avoidance(self, request: requests.SetAvoidance) -> None:
         pilot = self._link.need_session(live=request.enabled).pilot

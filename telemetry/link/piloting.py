@@ -31,7 +31,16 @@ from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of
 from telemetry.topics.messages import FlightStatus
 from telemetry.topics.onboard_lists import OnboardMission
-from telemetry.topics.requests import FlyManoeuvre, FlyWay, MayFlyManoeuvre, SetSpeed, StartAuto, StartGuided, TakeUp
+from telemetry.topics.requests import (
+    FlyManoeuvre,
+    FlyRest,
+    FlyWay,
+    MayFlyManoeuvre,
+    SetSpeed,
+    StartAuto,
+    StartGuided,
+    TakeUp,
+)
 from telemetry.topics.vehicle import VehicleState
 
 RESTART_PARAMETER = "MIS_RESTART"
@@ -233,11 +242,17 @@ class Pilot:
         """What would be flown after it. Raises NotAllowedError where it may not be flown now: what is refused here is
         not offered either."""
         self.avoidance.check_may_fly(request)
+        if request.kind != "sidestep" or request.rejoin_item is not None:
+            self._under_way.check_home()  # a sidestep that ends where it is counts its height from where the vehicle is
         return self._remaining_after(request)
 
     async def fly_manoeuvre(self, request: FlyManoeuvre) -> None:
         """Raises NotAllowedError as ``check_manoeuvre`` does."""
         self.avoidance.fly(request, self.check_manoeuvre(request))
+
+    def fly_rest(self, request: FlyRest) -> None:
+        self._under_way.check_home()
+        self.avoidance.fly_rest(request)
 
     async def pause(self) -> None:
         if self.avoidance.is_engaged:

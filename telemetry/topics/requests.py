@@ -16,6 +16,7 @@ from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.obstacles import AvoidBy
 from telemetry.topics.onboard_lists import Item, PlaceList
 from telemetry.topics.parameters import ParameterChange
+from telemetry.topics.vehicle import HomePlace
 
 # To the link node. What it answers stands behind the arrow; errors come back as DescribedError.
 
@@ -94,13 +95,15 @@ class UploadPlaces(OperatorRequest):
 class TakeUp(OperatorRequest):
     """Makes the mission on board, if its digest is this, the one that ``Resume`` flies, from its first item. -> None
 
-    Refused unless the vehicle holds still where that mission was certified to begin; so is ``Resume`` then.
+    Refused unless the vehicle holds still where that mission was certified to begin; so is ``Resume`` then. ``home`` as
+    for ``FlyWay``.
     """
 
     digest: str
     begins_lat_deg: float
     begins_lon_deg: float
     begins_alt_rel_home_m: float
+    home: HomePlace | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,7 +239,8 @@ class FlyWay(OperatorRequest):
     """Flies a certified way in GUIDED, from where the vehicle hovers; then it holds there or lands. -> None
 
     ``targets`` are no items of a mission: each is item 0. Refused when the vehicle moves, or is not where the way
-    begins. ``most_m_s``: for no higher speed is it certified. ``spare_m`` as for ``StartGuided``.
+    begins. ``most_m_s``: for no higher speed is it certified. ``spare_m`` as for ``StartGuided``. ``home``: from which
+    its heights count, as it was certified; refused where the vehicle tells another one, or none. None: not known.
     """
 
     targets: tuple[GuidedTarget, ...]
@@ -247,6 +251,7 @@ class FlyWay(OperatorRequest):
     waypoint_radius_m: float = 0.5
     end: Literal["land", "hold"] = "hold"
     spare_m: float | None = None
+    home: HomePlace | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,15 @@ converters, and the whole chain of processing."""
 
 
 @dataclass(frozen=True, slots=True)
+class HomePlace:
+    """By the vehicle's own heights above the sea."""
+
+    lat_deg: float
+    lon_deg: float
+    alt_amsl_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleState:
     """The latest of everything, each group with the time at which its last message came."""
 

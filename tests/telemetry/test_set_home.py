@@ -13,15 +13,15 @@ from telemetry.errors import NotAllowedError, RefusedError
 from telemetry.flight.guided.beginning import check_stands_there, home_elsewhere
 from telemetry.flight.guided.script_watches import HomeWatched
 from telemetry.flight.home_watch import CORRECTED_M, HomePlace, HomeWatch, home_of, is_there
-from telemetry.topics.messages import FlightStatus
-from telemetry.topics.requests import Resume, SetHome, StartAuto, StartGuided
+from telemetry.topics.messages import FlightStatus, GuidedTarget
+from telemetry.topics.requests import FlyManoeuvre, FlyRest, FlyWay, Resume, SetHome, StartAuto, StartGuided, TakeUp
 from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, Console, until
 from tests.telemetry.simulator_bench import Bench
 from tests.telemetry.test_home_watch import HOME, moved, state
 from tests.telemetry.test_mavlink_flights import QUICKLY_DOWN, TARGETS, items, simulated, start, upload
-from tests.telemetry.test_mission_taken_up import VEHICLES, holding
+from tests.telemetry.test_mission_taken_up import VEHICLES, holding, put_on_board
 from tests.telemetry.test_px4_flights import QUICK
 from tests.telemetry.test_px4_simulator import ready
 
@@ -68,6 +68,50 @@ def test_a_home_that_somebody_else_moved_in_flight_keeps_resume_back(autopilot: 
             await until(lambda: [text for text in bench.texts if "25 m to the east" in text])
             with pytest.raises(NotAllowedError, match="certified for the home before"):
                 await bench.handle(Resume(ME))
+
+    run(whole)
+
+
+@pytest.mark.parametrize(("autopilot", "parameters"), VEHICLES)
+def test_what_was_certified_for_the_home_before_is_refused_at_the_link_itself(
+    autopilot: str, parameters: object
+) -> None:
+    """Whoever judged it may not have heard of the other home; 0.7 m higher is nearer than a way may begin."""
+
+    async def whole() -> None:
+        async with holding(autopilot, parameters) as (bench, simulator, _digest):
+            pilot, judged = simulator.vehicle.autopilot, home_of(bench.state)
+            assert judged is not None
+            hovers, up_m = bench.state, bench.state.alt_rel_home_m
+            assert hovers.lat_deg is not None
+            assert hovers.lon_deg is not None
+            assert up_m is not None
+            place = (hovers.lat_deg, hovers.lon_deg)
+            ends = (GuidedTarget(0, *place, up_m + 1.0, 2.0),)
+            north_m, east_m, above_m = pilot.home_neu
+            report = await put_on_board(bench)
+
+            async def refused(words: str) -> None:
+                now_up_m = bench.state.alt_rel_home_m or 0.0
+                way = FlyWay(ME, ends, *place, now_up_m, 4.0, spare_m=5.0, home=judged)
+                for order in (way, TakeUp(ME, report.onboard.digest, *place, now_up_m, judged)):
+                    with pytest.raises(NotAllowedError, match=words):
+                        await bench.handle(order)
+
+            pilot.fix_home((north_m, east_m, above_m + 0.7))
+            await until(lambda: not is_there(home_of(bench.state), judged))
+            await refused(r"Home was moved by 0\.7 m since this was certified")
+            pilot.fix_home((north_m, east_m + 25.0, above_m))
+            await until(lambda: [text for text in bench.texts if "25 m to the east" in text])
+            await refused(r"Home was moved by 2[45]\.\d m since this was certified")
+            with pytest.raises(NotAllowedError, match="certified for the home before"):
+                await bench.handle(FlyRest(ME, ends))
+            with pytest.raises(NotAllowedError, match="certified for the home before"):
+                await bench.handle(FlyManoeuvre(ME, "over", ends, None))
+            pilot.fix_home((north_m, east_m, above_m))
+            await until(lambda: is_there(home_of(bench.state), judged))
+            await bench.handle(FlyWay(ME, ends, *place, up_m, 4.0, spare_m=5.0, home=judged))
+            await until(lambda: bench.flight.is_flown)
 
     run(whole)
 

@@ -31,6 +31,7 @@ from server.work.clocks import StepTimer
 from telemetry.errors import NotAllowedError, TelemetryError
 from telemetry.flight.certified_way import Flown, judged_way, nearest_rally, part_for, way_json, way_request, way_words
 from telemetry.flight.home_height import home_off_m
+from telemetry.flight.home_watch import home_of
 from telemetry.flight.preflight.parameters import NAMES
 from telemetry.flight.preflight.prepare import connect
 from telemetry.flight.watch import Watch, watching
@@ -192,7 +193,8 @@ class _Flier:
         state = await connect(station.link, watch, self._link, OPERATOR, say)
         state = await watch.until(lambda seen: _placed(seen.vehicle), timeout_s=POSITION_S) or state
         flown = await self._flown(station, state)
-        way = await asyncio.to_thread(self._judged, watch.vehicle or state, flown)
+        state = watch.vehicle or state
+        way = await asyncio.to_thread(self._judged, state, flown)
         end_progress()
         if not self._may_fly or way.problem == "way" or (way.problem == "return" and not self._accepts):
             if way.problem == "return":
@@ -203,7 +205,8 @@ class _Flier:
         asked_utc_s = time.time()
         most_m_s = self._request.profile.max_speed_m_s
         self._sets_out = True
-        await station.link.call(way_request(OPERATOR, way, self._wish, speed_m_s=self._speed_m_s, most_m_s=most_m_s))
+        request = way_request(OPERATOR, way, self._wish, home_of(state), speed_m_s=self._speed_m_s, most_m_s=most_m_s)
+        await station.link.call(request)
         return way, await self._followed(station, watch, asked_utc_s)
 
     async def _flown(self, station: Station, state: VehicleState) -> Flown:

@@ -28,7 +28,7 @@ from telemetry.bus.link_client import LinkClient
 from telemetry.errors import NotAllowedError, NoVehicleError, SilentError, TelemetryError
 from telemetry.flight.guided.beginning import why_moves
 from telemetry.flight.guided.handover import is_fresh
-from telemetry.flight.home_watch import home_of_takeoff
+from telemetry.flight.home_watch import HomePlace, home_of, home_of_takeoff
 from telemetry.flight.preflight.parameters import NAMES
 from telemetry.mavlink.autopilot_orders import HOLD_MODES
 from telemetry.mavlink.believing import is_in_the_air
@@ -81,6 +81,7 @@ class TakingUp:
     def forget(self) -> None:
         """Another flight, or what is on board is flown: no try that failed counts any more."""
         self._before: Before | None = None
+        self._certified_home: HomePlace | None = None
         self._sent: Literal["nothing", "mission", "places"] = "nothing"
 
     @property
@@ -180,10 +181,11 @@ class TakingUp:
         """Of what was read back, as JSON."""
         aboard, maps = await self._places(operator), await asyncio.to_thread(seen_maps, self._watch)
         now = replace(asked, state=self._state(), now_mono_s=time.monotonic(), aboard=aboard, maps=maps)
+        self._certified_home = home_of(now.state)
         return await self._lane.call(check_take_up, now, onboard)
 
     async def begin(self, operator: Operator, digest: str, made: MadeTakeUp) -> None:
-        await self._link.call(TakeUp(operator, digest, *made.begins))
+        await self._link.call(TakeUp(operator, digest, *made.begins, self._certified_home))
         self.forget()
 
     async def what_is_aboard(self, operator: Operator) -> str:

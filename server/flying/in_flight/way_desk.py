@@ -118,7 +118,8 @@ class WayDesk:
             raise NotCertifiedError(what, advice="" if first is None else first.mend)
         self._check_home(in_hand)
         since_utc_s = time.time()
-        request = way_request(operator, judged.way, judged.wish, speed_m_s=judged.speed_m_s, most_m_s=judged.most_m_s)
+        speed_m_s, most_m_s = judged.speed_m_s, judged.most_m_s
+        request = way_request(operator, judged.way, judged.wish, in_hand.home, speed_m_s=speed_m_s, most_m_s=most_m_s)
         await self._link.call(request)
         if self._in_hand is in_hand:
             doc = doc.model_copy(update={"flies": True})

@@ -8,7 +8,7 @@ from mapping.geometry.frames import apart_m
 from telemetry.errors import NotAllowedError
 from telemetry.flight.guided.handover import away_m, is_fresh
 from telemetry.flight.guided.orders import Place
-from telemetry.flight.home_watch import HomePlace
+from telemetry.flight.home_watch import ROSE_M, HomePlace, home_of, is_within, spare_up_m
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.topics.requests import FlyWay, StartGuided, TakeUp
 from telemetry.topics.vehicle import VehicleState
@@ -41,8 +41,25 @@ def why_not_from(request: StartGuided | FlyWay | TakeUp, state: VehicleState, no
         return NotAllowedError("The vehicle is not in the air.", advice="Take off first.")
     if (refusal := why_moves(state)) is not None:
         return refusal
+    if (refusal := _why_other_home(request, state)) is not None:
+        return refusal
     begins = Place(request.begins_lat_deg, request.begins_lon_deg, request.begins_alt_rel_home_m, math.nan)
     return _why_not_at(begins, state, now_s)
+
+
+def _why_other_home(request: FlyWay | TakeUp, state: VehicleState) -> NotAllowedError | None:
+    """Looked at in the last place before the vehicle: who judged it may not have heard of that home yet."""
+    if request.home is None:
+        return None
+    home, advice = home_of(state), "Ask for it again: it is certified anew for home as it is."
+    if home is None:
+        return NotAllowedError("The vehicle does not tell its home, for which this was certified.", advice=advice)
+    up_m = min(ROSE_M, spare_up_m(request.spare_m if isinstance(request, FlyWay) else None))
+    if is_within(home, request.home, up_m):
+        return None
+    away_m = apart_m((request.home.lat_deg, request.home.lon_deg), (home.lat_deg, home.lon_deg))
+    far_m = math.hypot(away_m, home.alt_amsl_m - request.home.alt_amsl_m)
+    return NotAllowedError(f"Home was moved by {far_m:.1f} m since this was certified.", advice=advice)
 
 
 def _why_not_up(request: StartGuided, state: VehicleState, now_s: float) -> NotAllowedError | None:

@@ -58,7 +58,9 @@ class GuidedScript:
         self._note = note
         self._leading = None if feed is None else Leading(feed)
         self._request, self._endpoints, self._orders = request, Endpoints(target, own), GuidedOrders(firmware, target)
-        self._watch, self._home_watched, self._punctuality = ModeWatch(), HomeWatched(request.spare_m), Punctuality()
+        certified = request.home if isinstance(request, FlyWay) else None
+        self._home_watched = HomeWatched(request.spare_m, certified)
+        self._watch, self._punctuality = ModeWatch(), Punctuality()
         self._targets = request.targets
         self._takeoff_m = request.takeoff_alt_rel_home_m if isinstance(request, StartGuided) else -math.inf
         self.phase: FlightPhase = "idle"

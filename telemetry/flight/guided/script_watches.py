@@ -7,7 +7,7 @@ import math
 from mapping.geometry.frames import apart_m
 from telemetry.flight.guided.handover import away_m
 from telemetry.flight.guided.orders import Place
-from telemetry.flight.home_watch import MOVED_M, HomePlace, follows_m, home_of
+from telemetry.flight.home_watch import HomePlace, follows_m, home_of, is_within, spare_up_m
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.vehicle import VehicleState
 
@@ -15,8 +15,6 @@ PATIENCE_S = 10.0
 NEARER_M = 0.5
 """Less may be the vehicle's swaying."""
 LEVEL_M = 0.5
-UNSEEN_M = 0.3
-"""What receivers wander, whatever a way has to spare."""
 
 
 class ModeWatch:
@@ -51,10 +49,11 @@ class ModeWatch:
 class HomeWatched:
     """Home as it was when the script had taken off, or set out: its places count from there, and go with it."""
 
-    def __init__(self, spare_m: float | None = None) -> None:
-        """``spare_m``: what the way keeps beyond the clearance that is required; None: not known."""
-        self._home: HomePlace | None = None
-        self._spare_m = math.inf if spare_m is None else max(UNSEEN_M, spare_m)
+    def __init__(self, spare_m: float | None = None, certified: HomePlace | None = None) -> None:
+        """``spare_m``: what the way keeps beyond the clearance that is required; ``certified``: home as it was judged
+        for; None: not known."""
+        self._home = certified
+        self._spare_m = spare_up_m(spare_m)
 
     def interruption(self, state: VehicleState) -> str:
         """Why the script must end: its places would be elsewhere, or as much higher or lower. Empty: they are not."""
@@ -62,10 +61,10 @@ class HomeWatched:
         self._home = before = self._home or home
         if home is None or before is None:
             return ""
+        if is_within(home, before, min(follows_m(state), self._spare_m)):
+            return ""
         away_m = apart_m((before.lat_deg, before.lon_deg), (home.lat_deg, home.lon_deg))
         rose_m = home.alt_amsl_m - before.alt_amsl_m
-        if away_m <= MOVED_M and abs(rose_m) <= min(follows_m(state), self._spare_m):
-            return ""
         far = f"{math.hypot(away_m, rose_m):.1f} m"
         return f"Home was moved by {far}: what is flown was certified for the home before. The vehicle holds."
 
