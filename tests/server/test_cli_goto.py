@@ -10,6 +10,7 @@ import pytest
 from affine import Affine
 from pyproj import CRS
 
+from mapping.geometry.frames import apart_m
 from planning.fence.fence_model import Fence, circle
 from planning.formats.fence_files import write_fence
 from planning.terrain.dsm import Dsm
@@ -73,6 +74,12 @@ def test_up_over_the_wall_and_home(link: str, dsm: Path) -> None:
     assert (there.code, there.json["flown"]) == (0, True), there.err
     assert max(place["alt_rel_home_m"] for place in there.json["places"]) > 9.0 + there.json["required_clearance_m"]
     assert there.json["clearance_m"] >= there.json["required_clearance_m"]
+    next_one = goto(link, dsm, "to", at(170.5, 130.5), "--height-m", 6, ON_GROUND)
+    assert (next_one.code, next_one.json["flown"], next_one.json["certified"]) == (0, True, True), next_one.err
+    ended, begins = there.json["places"][-1], next_one.json["places"][0]
+    away_m = apart_m((ended["lat_deg"], ended["lon_deg"]), (begins["lat_deg"], begins["lon_deg"]))
+    assert away_m < 1.0, "it begins where the way before it ended"
+    assert abs(begins["alt_rel_home_m"] - ended["alt_rel_home_m"]) < 1.0
     turned = goto(link, dsm, "look", at(100.5), ON_GROUND)
     assert turned.code == 0, turned.err
     home = goto(link, dsm, "home", "--height-m", 5, ON_GROUND)
