@@ -316,8 +316,8 @@ class Link:
             if self._grace.wants_hold(self._server_age_s(), guided=self._is_guided, now_s=time.monotonic()):
                 self.spawn(self.session.hold())
         flight = self.flight.status if self.session is None else self.session.pilot.status
-        if flight != self._told_flight:
-            self._told_flight = flight
+        before, self._told_flight = self._told_flight, flight
+        if flight != before:
             self._publish(Topic.FLIGHT, flight)
         self._tell_avoidance()
         self._tell()
@@ -387,10 +387,8 @@ async def open_link(publish: Callable[[str, Published], None], **options: Any) -
     failure: Exception | None = None
     async with asyncio.TaskGroup() as tasks:
         link = Link(publish, tasks, **options)
-        link.spawn(link.run_heartbeat())
-        link.spawn(link.run_clock())
-        link.spawn(link.keys.run())
-        link.spawn(link.commands.check())
+        for running in (link.run_heartbeat(), link.run_clock(), link.keys.run(), link.commands.check()):
+            link.spawn(running)
         try:
             yield link
         except Exception as error:  # Raised again below: the group would wrap it.

@@ -14,13 +14,14 @@ from dataclasses import replace
 
 from mapping.geometry.frames import apart_m
 from planning.basics.mav_cmd import MavCmd
+from planning.basics.plan_model import Firmware
 from planning.formats.commands import FLOWN_TO
 from telemetry.errors import MissionUnknownError, NotAllowedError, RefusedError, SilentError, TelemetryError
 from telemetry.flight.guided.beginning import why_moves
 from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_from
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.onboard import OnBoard, check_same_mission
-from telemetry.link.procedures import see_home_here
+from telemetry.link.procedures import ReadParameters, see_home_here
 from telemetry.mavlink.autopilot_orders import HOLD_MODES
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import sequence_of
@@ -29,6 +30,7 @@ from telemetry.topics.onboard_lists import Item, OnboardMission
 from telemetry.topics.requests import StartAuto
 from telemetry.topics.vehicle import VehicleState
 
+RESTART_PARAMETER = "MIS_RESTART"
 ARMED_WITHIN_S = 10.0
 ReadMission = Callable[[], Awaitable[OnboardMission]]
 AGAIN_S = 8.0
@@ -69,6 +71,16 @@ async def start_mission(vehicle: AdoptedVehicle, digest: str, read_mission: Read
         await _arm(vehicle)
         await vehicle.obey(orders.start_mission())
         await _see_armed(vehicle)
+
+
+async def check_not_begun_anew(firmware: Firmware, read_parameters: ReadParameters) -> None:
+    """Raises NotAllowedError for an ArduPilot that would begin its mission again instead of going on with it."""
+    if firmware != "ardupilot":
+        return
+    if (await read_parameters((RESTART_PARAMETER,)))[RESTART_PARAMETER]:
+        what = f"The vehicle would begin its mission again: its parameter {RESTART_PARAMETER} is not 0."
+        advice = f"Return home, set {RESTART_PARAMETER} to 0, and start where the flight broke off."
+        raise NotAllowedError(what, advice=advice)
 
 
 async def _send_off(vehicle: AdoptedVehicle) -> None:

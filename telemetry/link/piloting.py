@@ -7,10 +7,8 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any
 
 from telemetry.errors import NotAllowedError, RefusedError, TelemetryError
-from telemetry.flight.guided.guided import GuidedScript
 from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_flight
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.avoidance import Avoidance, remaining_after
@@ -19,13 +17,15 @@ from telemetry.link.missions import (
     ReadMission,
     check_holds,
     check_may_start,
+    check_not_begun_anew,
     first_item_next,
     same_route,
     set_speeds,
     start_mission,
 )
 from telemetry.link.onboard import HOME_MOVED, Started, UnderWay, check_begins, check_same_mission
-from telemetry.link.procedures import Accepted, Procedures, ReadParameters, Spawn, change_mode, guided_way
+from telemetry.link.procedures import Accepted, Procedures, ReadParameters, Spawn, change_mode
+from telemetry.link.scripting import SUPERSEDED, Scripting
 from telemetry.mavlink.autopilot_orders import HOLD_MODES, MISSION_MODES
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of
@@ -43,10 +43,6 @@ from telemetry.topics.requests import (
 )
 from telemetry.topics.vehicle import VehicleState
 
-RESTART_PARAMETER = "MIS_RESTART"
-NOT_BEGUN = ("idle", "arming", "interrupted")
-SUPERSEDED = "Another command was given."
-
 
 class Pilot:
     """Of one adopted vehicle. Every method raises RefusedError, SilentError or NotAllowedError."""
@@ -63,29 +59,22 @@ class Pilot:
     ) -> None:
         """``read_mission``: reads back what is on board; ``alarm``: tells at once what has gone wrong in flight."""
         self.vehicle, self.flight = vehicle, flight
-        self.script: GuidedScript | None = None
         self.join: JoinMission | None = None
         self.avoidance = Avoidance(
             vehicle, remaining=self._remaining, on_engage=self._yield_to_avoidance, on_end=self._follow_avoidance
         )
         self._spawn, self._procedures = spawn, Procedures(spawn, flight.say)
         self._read_parameters, self._read_mission, self._alarm = read_parameters, read_mission, alarm
-        self._script_since_s: float | None = None
-        self._most_m_s: float | None = None
-        """For which the way that is flown is certified; None: it is a mission's."""
+        self._scripting = Scripting(vehicle, self._procedures, read_parameters)
         self._flown: OnboardMission | None = None
         """What was on board in the last flight."""
         self._under_way = UnderWay(vehicle.onboard)
 
     @property
-    def script_flies(self) -> bool:
-        return self.script is not None and not self.script.is_over
-
-    @property
     def is_guided(self) -> bool:
         """The vehicle waits for, or flies to, places that this link hands over."""
         joins = self.join is not None and self.join.is_active
-        return self.script_flies or joins or self.avoidance.is_engaged
+        return self._scripting.flies or joins or self.avoidance.is_engaged
 
     @property
     def flies_mission(self) -> bool:
@@ -120,14 +109,14 @@ class Pilot:
         if self.avoidance.is_engaged:
             self._follow_avoidance()
             return
-        if self.script is not None:
-            self._follow_script(self.script)
+        if (status := self._scripting.on_tick()) is not None:
+            self.flight.script(status, armed=state.armed)
         if not self.flight.is_under_way:
             self._under_way.begin(None)
         elif self.vehicle.onboard.mission is not None:
             self._flown = self.vehicle.onboard.mission
         joining = self.join is not None and self.join.is_active
-        if self.script is None:
+        if not self._scripting.is_there:
             self.flight.on_state(state, self.vehicle.onboard.mission, joining=joining)
         self._watch_mission(state)
 
@@ -164,13 +153,6 @@ class Pilot:
             status = replace(status, targets=before.targets)
         self.flight.script(status, armed=self.vehicle.state.armed)
 
-    def _follow_script(self, script: GuidedScript) -> None:
-        status = script.status(since_utc_s=self._script_since_s)
-        self.flight.script(status, armed=self.vehicle.state.armed)
-        self._procedures.on_tick()
-        if script.is_over:
-            self.script = None
-
     # Commands.
 
     async def arm(self) -> None:
@@ -194,7 +176,8 @@ class Pilot:
         self._check_on_ground()
         if not request.targets:
             raise NotAllowedError("The script has no targets.", advice="Plan a mission first.")
-        await self._fly_script(request)
+        self.join = None
+        await self._scripting.fly(request)
 
     async def fly_way(self, request: FlyWay) -> None:
         """From where the vehicle hovers. What was under way ends; a mission that was paused is not gone on with."""
@@ -203,35 +186,11 @@ class Pilot:
         check_begins(request, self.vehicle.state)  # before anything ends that may hold the vehicle now
         self._end_current()
         self._under_way.begin(None)
-        await self._fly_script(request)
-
-    async def _fly_script(self, request: StartGuided | FlyWay) -> None:
-        vehicle, self.join = self.vehicle, None
-        begun: GuidedScript | None = None
-
-        async def fly(_: Accepted) -> None:
-            nonlocal begun
-            way = await guided_way(vehicle.firmware, self._read_parameters)
-            begun = script = GuidedScript(
-                request, vehicle.state, firmware=vehicle.firmware, target=vehicle.target, note=way.note, feed=way.feed
-            )
-            self.script, self._script_since_s = script, time.time()
-            self._most_m_s = request.most_m_s if isinstance(request, FlyWay) else None
-            try:
-                await vehicle.exchanges.run(script)
-            finally:
-                script.stop(SUPERSEDED)
-
-        await self._procedures.take_over(fly, shows=lambda: begun is not None and begun.phase not in NOT_BEGUN)
+        self.join = None
+        await self._scripting.fly(request)
 
     async def set_speed(self, request: SetSpeed) -> None:
-        most_m_s = self._most_m_s
-        if self.script is None or not self.script_flies or most_m_s is None:
-            raise NotAllowedError("No guided way is being flown.", advice="Ask for one, with its speed.")
-        if not 0.0 < request.speed_m_s <= most_m_s:
-            what = f"{request.speed_m_s:g} m/s were asked for; the way is certified for at most {most_m_s:g} m/s."
-            raise NotAllowedError(what, advice="Give a speed within that.")
-        self._tell_script(self.script.set_speed(request.speed_m_s, time.monotonic()))
+        self._scripting.set_speed(request)
 
     async def stop_motors(self) -> None:
         """Nothing is waited for or asked first."""
@@ -258,10 +217,8 @@ class Pilot:
         if self.avoidance.is_engaged:
             self.avoidance.pause()
             return
-        if self.script_flies and self.script is not None:
-            self._tell_script(self.script.pause(time.monotonic()))
-            if not self.script_flies or self.script.phase == "paused":
-                return
+        if self._scripting.pause():
+            return
         state = self.vehicle.state
         starts = self.flight.is_under_way or self._procedures.is_under_way  # it may leave the ground any moment
         if not starts and (not state.armed or state.landed == "on_ground"):
@@ -285,11 +242,8 @@ class Pilot:
         self._under_way.check_home()
         if self.avoidance.is_engaged:
             return
-        if self.script_flies and self.script is not None:
-            if self.script.ends_held:
-                raise NotAllowedError(self.script.ends_held, advice="Ask for another way, or return.")
-            if self.script.is_flown:
-                raise NotAllowedError("The way is flown: nothing is paused.", advice="Ask for another one, or return.")
+        if self._scripting.flies:
+            self._scripting.check_resumes()
             return
         if not self.vehicle.state.armed or self.flight.status.way != "auto" or not self.flight.is_under_way:
             raise NotAllowedError("There is no paused mission to go on with.", advice="Start the mission.")
@@ -301,8 +255,8 @@ class Pilot:
         if self.avoidance.is_engaged:
             self.avoidance.resume()
             return
-        if self.script_flies and self.script is not None:
-            self._tell_script(self.script.resume(time.monotonic()))
+        if self._scripting.flies:
+            self._scripting.resume()
             return
         join = self.join
         if join is not None and not join.is_done:
@@ -312,20 +266,21 @@ class Pilot:
             await self._read_mission()
             self._check_resumes()
         if self._under_way.started.begins is None:
-            await self._check_goes_on()
+            await check_not_begun_anew(self.vehicle.firmware, self._read_parameters)
         await self._procedures.take_over(self._mission_mode)
 
     def check_holds(self) -> None:
         """Raises NotAllowedError unless the vehicle holds in the air, and nothing here leads it."""
-        leads = self.script_flies and self.script is not None and self.script.phase != "paused"
-        check_holds(self.vehicle.state, is_led=leads or self.avoidance.leads or self._procedures.is_under_way)
+        leads = self._scripting.leads or self.avoidance.leads
+        check_holds(self.vehicle.state, is_led=leads or self._procedures.is_under_way)
 
     async def take_up(self, request: TakeUp) -> None:
         self.check_holds()
         check_begins(request, self.vehicle.state)
         check_same_mission(self.vehicle.onboard, request.digest)
         self._end_current()
-        self.script = self.join = None
+        self._scripting.drop()
+        self.join = None
         await first_item_next(self.vehicle)
         self._under_way.begin(request.digest, request)
         onboard = self.vehicle.onboard.mission
@@ -368,8 +323,8 @@ class Pilot:
         """Nobody watches any more: what this link hands over is stopped."""
         if self.avoidance.is_engaged:
             self.avoidance.pause()
-        elif self.script_flies and self.script is not None:
-            self._tell_script(self.script.pause(time.monotonic()))
+        elif self._scripting.flies:
+            self._scripting.pause()
         elif self.join is not None and self.join.is_active:
             await self.pause()
 
@@ -377,29 +332,23 @@ class Pilot:
 
     def _remaining(self, state: VehicleState) -> RemainingMission | None:
         """What is left of the flight; None while nothing is flown that avoidance could go on with."""
-        if self.script_flies:
-            script = self.script
-            flies = script is not None and script.phase == "flying"
-            return RemainingMission(script.left, script.end, "guided") if flies and script is not None else None
+        if self._scripting.flies:
+            return self._scripting.remaining if self._scripting.flies_on else None
         if self.join is not None and self.join.is_active:
             return self.join.remaining
         return remaining_flight(self.vehicle.onboard.mission, state)
 
     def _remaining_after(self, request: FlyManoeuvre | MayFlyManoeuvre) -> RemainingMission:
         """What is flown after the way past an obstacle. Raises NotAllowedError where that cannot be flown."""
-        remaining = self.avoidance.remaining
-        if remaining is None and self.script_flies and self.script is not None:
-            remaining = RemainingMission(self.script.left, self.script.end, "guided")
+        remaining = self.avoidance.remaining or self._scripting.remaining
         onboard, firmware = self.vehicle.onboard.mission, self.vehicle.firmware
-        return remaining_after(request, remaining, onboard, firmware, flies_way=self._most_m_s is not None)
+        return remaining_after(request, remaining, onboard, firmware, flies_way=self._scripting.most_m_s is not None)
 
     def _yield_to_avoidance(self) -> None:
         """What is under way sends nothing any more."""
         self._procedures.end()
         self.join = None
-        if self.script is not None:
-            self.script.stop(SUPERSEDED)
-            self.script = None
+        self._scripting.drop()
 
     # How they are carried out.
 
@@ -436,25 +385,12 @@ class Pilot:
         if self.vehicle.firmware == "ardupilot":
             await set_speeds(self.vehicle, item_of(self.vehicle.state) or 1)
 
-    async def _check_goes_on(self) -> None:
-        if self.vehicle.firmware != "ardupilot":
-            return
-        if (await self._read_parameters((RESTART_PARAMETER,)))[RESTART_PARAMETER]:
-            what = f"The vehicle would begin its mission again: its parameter {RESTART_PARAMETER} is not 0."
-            advice = f"Return home, set {RESTART_PARAMETER} to 0, and start where the flight broke off."
-            raise NotAllowedError(what, advice=advice)
-
     async def _change_mode(self, *names: str) -> None:
         """To the first of ``names`` that is not refused. What was under way ends first and sends nothing any more."""
         self._end_current()
         await self._procedures.take_over(lambda accepted: change_mode(self.vehicle, names, accepted))
 
-    def _tell_script(self, actions: list[Any]) -> None:
-        if self.script is not None:
-            self.vehicle.exchanges.perform(self.script, actions)
-
     def _end_current(self) -> None:
         self._procedures.end()
         self.avoidance.stop()
-        if self.script_flies and self.script is not None:
-            self.script.stop(SUPERSEDED)
+        self._scripting.stop()
