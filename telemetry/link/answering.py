@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from telemetry.errors import NotAllowedError, NoVehicleError, OvertakenError, TelemetryError
 from telemetry.link.link import Link
-from telemetry.link.piloting import Pilot
+from telemetry.link.piloting.pilot import Pilot
 from telemetry.topics import requests
 from telemetry.topics.parameters import MOST_CHANGES
 from telemetry.topics.vehicle import VehicleState

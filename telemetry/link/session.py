@@ -22,8 +22,8 @@ from telemetry.link.audit import AUTOPILOT, CommandLog
 from telemetry.link.line import Line
 from telemetry.link.log_reading import LogReading
 from telemetry.link.peers import REFUSED_S, Peers
-from telemetry.link.piloting import Pilot
-from telemetry.link.procedures import Spawn
+from telemetry.link.piloting.pilot import Pilot
+from telemetry.link.piloting.procedures import Spawn
 from telemetry.link.publishing import StatePublisher
 from telemetry.link.signatures import KeyRing
 from telemetry.link.transferring import Transfers

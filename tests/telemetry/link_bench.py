@@ -11,7 +11,7 @@ from typing import Any
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.answering import Answering, OperatorRight
 from telemetry.link.link import Link, open_link
-from telemetry.link.piloting import Pilot
+from telemetry.link.piloting.pilot import Pilot
 from telemetry.topics.messages import (
     CommandRecord,
     FlightStatus,

@@ -23,7 +23,7 @@ from telemetry.link.answering import Answering, OperatorRight
 from telemetry.link.line import Line
 from telemetry.link.link import TICK_S, Link
 from telemetry.link.peers import Source
-from telemetry.link.procedures import OPTIONS, STRAIGHT_LEGS
+from telemetry.link.piloting.procedures import OPTIONS, STRAIGHT_LEGS
 from telemetry.mavlink.address import parse_address
 from telemetry.mavlink.codec import Packer, Parser
 from telemetry.mavlink.items import item_message, items_from_mission

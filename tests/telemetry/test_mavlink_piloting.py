@@ -12,10 +12,10 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import MissionUnknownError, NotAllowedError, SilentError
-from telemetry.link import procedures
-from telemetry.link.missions import check_same_mission, speeds_before
 from telemetry.link.onboard import OnBoard
-from telemetry.link.piloting import Pilot
+from telemetry.link.piloting import procedures
+from telemetry.link.piloting.missions import check_same_mission, speeds_before
+from telemetry.link.piloting.pilot import Pilot
 from telemetry.mavlink.flight_keeper import FlightKeeper
 from telemetry.topics.messages import FlightStatus
 from telemetry.topics.onboard_lists import Item, OnboardMission

@@ -9,7 +9,7 @@ from telemetry.errors import NotAllowedError
 from telemetry.flight.guided.guided import GuidedScript
 from telemetry.flight.guided.remaining_mission import RemainingMission
 from telemetry.link.adopted import AdoptedVehicle
-from telemetry.link.procedures import Accepted, Procedures, ReadParameters, guided_way
+from telemetry.link.piloting.procedures import Accepted, Procedures, ReadParameters, guided_way
 from telemetry.topics.messages import FlightStatus
 from telemetry.topics.requests import FlyWay, SetSpeed, StartGuided
 

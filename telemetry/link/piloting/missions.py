@@ -21,7 +21,7 @@ from telemetry.flight.guided.beginning import why_moves
 from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_from
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.onboard import OnBoard, check_same_mission
-from telemetry.link.procedures import ReadParameters, see_home_here
+from telemetry.link.piloting.procedures import ReadParameters, see_home_here
 from telemetry.mavlink.autopilot_orders import HOLD_MODES
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import sequence_of

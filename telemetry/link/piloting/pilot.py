@@ -12,7 +12,8 @@ from telemetry.errors import NotAllowedError, RefusedError, TelemetryError
 from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_flight
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.avoidance import Avoidance, remaining_after
-from telemetry.link.missions import (
+from telemetry.link.onboard import HOME_MOVED, Started, UnderWay, check_begins, check_same_mission
+from telemetry.link.piloting.missions import (
     JoinMission,
     ReadMission,
     check_holds,
@@ -23,9 +24,8 @@ from telemetry.link.missions import (
     set_speeds,
     start_mission,
 )
-from telemetry.link.onboard import HOME_MOVED, Started, UnderWay, check_begins, check_same_mission
-from telemetry.link.procedures import Accepted, Procedures, ReadParameters, Spawn, change_mode
-from telemetry.link.scripting import SUPERSEDED, Scripting
+from telemetry.link.piloting.procedures import Accepted, Procedures, ReadParameters, Spawn, change_mode
+from telemetry.link.piloting.scripting import SUPERSEDED, Scripting
 from telemetry.mavlink.autopilot_orders import HOLD_MODES, MISSION_MODES
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of
