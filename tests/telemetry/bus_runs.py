@@ -24,11 +24,12 @@ def short_folder() -> Iterator[Path]:
 
 
 def run(whole: Callable[[], Awaitable[T]]) -> T:
-    async def bounded() -> T:
-        async with asyncio.timeout(PATIENCE_S):
-            return await whole()
+    return asyncio.run(bounded(whole))
 
-    return asyncio.run(bounded())
+
+async def bounded(whole: Callable[[], Awaitable[T]]) -> T:
+    async with asyncio.timeout(PATIENCE_S):
+        return await whole()
 
 
 class Participant:

@@ -26,8 +26,8 @@ from telemetry.topics.requests import (
     StartGuided,
     StopMotors,
 )
-from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, Console, console, free_port, until
+from tests.telemetry.own_time import run
 from tests.telemetry.test_mavlink_flights import LAT_DEG, LON_DEG, QUICKLY_DOWN
 from tests.telemetry.udp_faults import Proxy, lossy_udp
 

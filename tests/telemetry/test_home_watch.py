@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from mapping.geometry.frames import moved_deg
 from telemetry.flight.home_watch import MOVED_M, ROSE_M, HomePlace, HomeWatch, moved_words
 from telemetry.topics.vehicle import VehicleState
-from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import until
+from tests.telemetry.own_time import run
 from tests.telemetry.test_mission_taken_up import VEHICLES, holding
 
 HOME = HomePlace(-37.0, 175.0, 800.0)

@@ -19,8 +19,8 @@ from telemetry.topics.link_ways import WayStatus
 from telemetry.topics.messages import RawFrame
 from telemetry.topics.requests import Adopt, Arm, Connect, Disarm, Disconnect, Pause, Resume, SetSigning, StartAuto
 from telemetry.traffic.picture import EVERY_S
-from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, Console, console, until
+from tests.telemetry.own_time import run
 from tests.telemetry.test_mavlink_flights import ALT_M, LAT_DEG, LON_DEG, items, phase, start, upload
 from tests.telemetry.traffic_messages import adsb_message, over_the_air
 from tests.telemetry.udp_faults import Proxy, lossy_udp, routed_udp

@@ -17,9 +17,9 @@ from telemetry.topics.messages import FlightStatus
 from telemetry.topics.onboard_lists import OnboardMission
 from telemetry.topics.requests import TakeUp
 from telemetry.topics.vehicle import VehicleState
-from tests.telemetry.bus_runs import run
 from tests.telemetry.frames import ARMED, AUTO, heartbeat
 from tests.telemetry.link_bench import ME
+from tests.telemetry.own_time import run
 from tests.telemetry.test_mavlink_piloting import BRAKE, MISSION, POSITION, desk, in_air
 
 TAKEN_UP = TakeUp(ME, "new", -37.0, 175.0, 10.0)

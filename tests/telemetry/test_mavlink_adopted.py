@@ -17,9 +17,9 @@ from telemetry.mavlink.address import parse_address
 from telemetry.topics.messages import Candidate
 from telemetry.topics.onboard_lists import OnboardMission
 from telemetry.topics.vehicle import VehicleState
-from tests.telemetry.bus_runs import run
 from tests.telemetry.fake_vehicle import ack
 from tests.telemetry.frames import ARMED, GUIDED, attitude, heard, heartbeat
+from tests.telemetry.own_time import run
 
 CANDIDATE = Candidate("id", "tcp:127.0.0.1:5760", "127.0.0.1:5760", 1, 1, "ardupilot", 2)
 

@@ -17,8 +17,8 @@ from telemetry.topics.messages import FlightStatus, GuidedTarget
 from telemetry.topics.obstacles import AvoidanceStatus, PerceptionSettings, PerceptionStatus, Region
 from telemetry.topics.requests import FlyManoeuvre, Pause, Resume, ReturnHome, SetAvoidance, StartAuto, StartGuided
 from tests.telemetry.avoiding_bench import Wall, seen_at
-from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, Console, again_and_again, until
+from tests.telemetry.own_time import run
 from tests.telemetry.test_mavlink_flights import (
     LAT_DEG,
     LON_DEG,

@@ -15,8 +15,8 @@ import pytest
 from telemetry.mavlink.address import Address, parse_address
 from telemetry.mavlink.connections import Connection, Receiver, make_connection
 from telemetry.mavlink.connections.base import RETRY_S, described
-from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import free_port, until
+from tests.telemetry.own_time import run
 
 
 class Ear:

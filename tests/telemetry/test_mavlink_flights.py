@@ -29,8 +29,8 @@ from telemetry.topics.requests import (
     StartGuided,
     Upload,
 )
-from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, Console, console, until
+from tests.telemetry.own_time import run
 
 LAT_DEG, LON_DEG, ALT_M = -37.0, 175.0, 800.0
 STEP_DEG = 8e-5

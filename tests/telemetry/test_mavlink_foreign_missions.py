@@ -13,8 +13,8 @@ from telemetry.simulation.simulator.run import Simulator
 from telemetry.topics.messages import VehicleText
 from telemetry.topics.onboard_lists import Item
 from telemetry.topics.requests import Resume, ReturnHome, StartAuto
-from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, Console, until
+from tests.telemetry.own_time import run
 from tests.telemetry.test_mavlink_flights import items, phase, simulated, start, upload
 
 PATIENCE_S = 20

@@ -13,10 +13,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from telemetry.errors import NotAllowedError
 from telemetry.topics.requests import Adopt, Arm, Connect, Resume, ReturnHome, Upload
 from telemetry.topics.vehicle import VehicleState
-from tests.telemetry.bus_runs import run
 from tests.telemetry.fake_vehicle import UdpVehicle, ack
 from tests.telemetry.frames import packed
 from tests.telemetry.link_bench import ME, Console, console, free_port, until
+from tests.telemetry.own_time import run
 
 AUTO, RTL, LOITER = 3, 6, 5
 ON_GROUND, IN_AIR = 1, 2

@@ -11,8 +11,8 @@ from planning.basics.mav_cmd import MavCmd
 from telemetry.errors import SilentError
 from telemetry.simulation.simulator.protocol.mavlink import Endpoint
 from telemetry.topics.requests import StartAuto
-from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, until
+from tests.telemetry.own_time import run
 from tests.telemetry.test_mavlink_flights import phase, simulated, upload
 
 SLOW_S = 2.5

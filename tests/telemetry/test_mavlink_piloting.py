@@ -20,10 +20,10 @@ from telemetry.mavlink.flight_keeper import FlightKeeper
 from telemetry.topics.messages import FlightStatus
 from telemetry.topics.onboard_lists import Item, OnboardMission
 from telemetry.topics.requests import StartAuto
-from tests.telemetry.bus_runs import run
 from tests.telemetry.fake_vehicle import ack
 from tests.telemetry.frames import ARMED, AUTO, GUIDED, RTL, heartbeat
 from tests.telemetry.link_bench import until
+from tests.telemetry.own_time import run
 from tests.telemetry.test_mavlink_adopted import Bench
 
 BRAKE = 17

@@ -15,8 +15,8 @@ from telemetry.errors import NotAllowedError
 from telemetry.simulation.simulator.run import Simulator
 from telemetry.topics.requests import Resume, SetAvoidance, StartAuto
 from telemetry.topics.tracks import Track, TracksStatus
-from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, Console, again_and_again, until
+from tests.telemetry.own_time import run
 from tests.telemetry.test_mavlink_avoidance import HURRIED, avoidance, landed, taken_off
 from tests.telemetry.test_mavlink_flights import LAT_DEG, LON_DEG, simulated, start, upload
 

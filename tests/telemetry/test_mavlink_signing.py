@@ -20,10 +20,10 @@ from telemetry.mavlink.signing import COPY, EPOCH_S, FARTHEST, MOST_WAYS, PER_S,
 from telemetry.simulation.simulator.run import SimOptions, flying
 from telemetry.topics.messages import RawFrame
 from telemetry.topics.requests import Arm, Connect, SetSigning
-from tests.telemetry.bus_runs import run
 from tests.telemetry.fake_vehicle import UdpVehicle, beat
 from tests.telemetry.frames import attitude, heartbeat, packed
 from tests.telemetry.link_bench import ME, console, free_port, until
+from tests.telemetry.own_time import run
 
 KEY = bytes(range(32))
 NOW = timestamp_of(EPOCH_S + 400 * 86_400 * 10)

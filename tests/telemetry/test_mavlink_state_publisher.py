@@ -5,8 +5,8 @@ from dataclasses import replace
 
 from telemetry.link.publishing import PERIOD_S, StatePublisher
 from telemetry.topics.vehicle import VehicleState
-from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import until
+from tests.telemetry.own_time import run
 
 FIRST = VehicleState(1, 1, position_t_mono_s=1.0)
 

@@ -13,8 +13,8 @@ from telemetry.errors import MissionUnknownError, NotAllowedError, TelemetryErro
 from telemetry.simulation.simulator.run import Simulator
 from telemetry.topics.onboard_lists import Item, UploadReport
 from telemetry.topics.requests import Download, Pause, Resume, StartAuto, TakeUp, Upload
-from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, Console, until
+from tests.telemetry.own_time import run
 from tests.telemetry.test_mavlink_flights import (
     ALT_M,
     LAT_DEG,

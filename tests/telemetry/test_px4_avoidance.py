@@ -15,8 +15,8 @@ from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.obstacles import PerceptionSettings, PerceptionStatus
 from telemetry.topics.requests import FlyManoeuvre, MayFlyManoeuvre, Pause, Resume, StartAuto
 from tests.telemetry.avoiding_bench import Wall
-from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, Console, again_and_again, until
+from tests.telemetry.own_time import run
 from tests.telemetry.test_mavlink_avoidance import FRAME_S, HURRIED, avoidance, seen, states, switch_on
 from tests.telemetry.test_mavlink_flights import LAT_DEG, LON_DEG, STEP_DEG, phase, simulated, start, upload
 from tests.telemetry.test_px4_flights import QUICK

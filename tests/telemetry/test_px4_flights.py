@@ -10,8 +10,8 @@ import pytest
 from telemetry.simulation.simulator.run import Simulator
 from telemetry.topics.messages import FlightStatus, GuidedTarget
 from telemetry.topics.requests import Land, Pause, ReadParameters, Resume, ReturnHome, StartAuto, StartGuided
-from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, Console, until
+from tests.telemetry.own_time import run
 from tests.telemetry.test_mavlink_flights import (
     LAT_DEG,
     LON_DEG,

@@ -16,8 +16,8 @@ from telemetry.flight.home_watch import CORRECTED_M, HomePlace, HomeWatch, home_
 from telemetry.topics.messages import FlightStatus, GuidedTarget
 from telemetry.topics.requests import FlyManoeuvre, FlyRest, FlyWay, Resume, SetHome, StartAuto, StartGuided, TakeUp
 from telemetry.topics.vehicle import VehicleState
-from tests.telemetry.bus_runs import run
 from tests.telemetry.link_bench import ME, Console, until
+from tests.telemetry.own_time import run
 from tests.telemetry.simulator_bench import Bench
 from tests.telemetry.test_home_watch import HOME, moved, state
 from tests.telemetry.test_mavlink_flights import QUICKLY_DOWN, TARGETS, items, simulated, start, upload
