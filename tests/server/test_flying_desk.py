@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import json
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,33 +25,11 @@ from tests.server.flying_desk_bench import ME, QUAD, Bench, Made
 pytestmark = pytest.mark.xdist_group("flying-desk")
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Made]:
-    made = Made(tmp_path_factory.mktemp("data"))
-    yield made
-    made.library.close()
-
-
-@pytest.fixture(scope="module")
-def runner() -> Iterator[asyncio.Runner]:
-    with asyncio.Runner() as made:
-        yield made
-
-
-@pytest.fixture(scope="module")
-def both(runner: asyncio.Runner) -> Iterator[tuple[Lane, Lane]]:
-    """For planning and for flying: processes that take a while to start."""
-    plan, flight = Lane("plan"), Lane("flight")
-    yield plan, flight
-    runner.run(plan.close())
-    runner.run(flight.close())
-
-
 def test_a_flight_from_upload_to_start(
-    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+    made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
 ) -> None:
     async def scenario() -> None:
-        bench = Bench(made, tmp_path / "onboard.json", both)
+        bench = Bench(made, tmp_path / "onboard.json", lanes)
         uploaded = (await bench.desk.upload(ME, 3)).onboard
         assert (uploaded.state, uploaded.plan_name, uploaded.is_open_plan) == ("verified", "Demo flight", True)
         assert uploaded.items == len(bench.vehicle.items) > 5
@@ -96,7 +73,7 @@ def test_a_flight_from_upload_to_start(
         with pytest.raises(CheckNeededError, match="not been checked"):
             await bench.desk.start(ME, StartFlight(digest=uploaded.digest or ""))
 
-        again = Bench(made, tmp_path / "onboard.json", both)
+        again = Bench(made, tmp_path / "onboard.json", lanes)
         again.desk.on_link(LinkStatus(0.0, mission_state="verified", mission_digest=uploaded.digest))
         assert again.desk.state.onboard.plan_name == "Demo flight"
         again.desk.on_link(LinkStatus(0.0, mission_state="verified", mission_digest="another"))
@@ -106,12 +83,12 @@ def test_a_flight_from_upload_to_start(
 
 
 def test_what_is_proved_for_auto_only_is_not_handed_over_one_at_a_time(
-    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+    made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
 ) -> None:
     """5.6 m are kept: enough for AUTO with 2.9 m of position error, 0.1 m too little for GUIDED."""
 
     async def scenario() -> None:
-        bench = Bench(made, tmp_path / "onboard.json", both)
+        bench = Bench(made, tmp_path / "onboard.json", lanes)
         profile = made.document.profile.model_copy(update={"position_error_m": 2.9})
         bench.plan = bench.plan.model_copy(update={"document": made.document.model_copy(update={"profile": profile})})
         digest_ = await bench.ready()
@@ -125,10 +102,10 @@ def test_what_is_proved_for_auto_only_is_not_handed_over_one_at_a_time(
 
 
 def test_another_home_moves_the_heights(
-    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+    made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
 ) -> None:
     async def scenario() -> None:
-        bench = Bench(made, tmp_path / "onboard.json", both)
+        bench = Bench(made, tmp_path / "onboard.json", lanes)
         before = (await bench.desk.upload(ME, 3)).onboard.digest
         bench.live.state = made.standing(north_m=14.0)
         state = await bench.desk.check(ME)
@@ -153,14 +130,14 @@ def test_another_home_moves_the_heights(
 
 
 def test_a_check_holds_for_one_vehicle_one_mission_and_one_place(
-    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+    made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
 ) -> None:
     def status(digest_: str, **changes: Any) -> LinkStatus:
         now = LinkStatus(time.monotonic(), adopted=QUAD, mission_state="verified", mission_digest=digest_)
         return replace(now, **changes)
 
     async def scenario() -> None:
-        bench = Bench(made, tmp_path / "onboard.json", both)
+        bench = Bench(made, tmp_path / "onboard.json", lanes)
         digest_ = await bench.ready()
         bench.desk.on_link(status(digest_))
         bench.desk.on_link(LinkStatus(0.0, mission_state="unknown"))
@@ -189,10 +166,10 @@ def test_a_check_holds_for_one_vehicle_one_mission_and_one_place(
 
 
 def test_what_must_be_accepted_is_not_flown_without(
-    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+    made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
 ) -> None:
     async def scenario() -> None:
-        bench = Bench(made, tmp_path / "onboard.json", both)
+        bench = Bench(made, tmp_path / "onboard.json", lanes)
         bench.live.state = replace(made.standing(), gnss_fix="3d", horizontal_accuracy_m=9.0)
         digest_ = (await bench.desk.upload(ME, 3)).onboard.digest or ""
         state = await bench.desk.check(ME)
@@ -210,14 +187,14 @@ def test_what_must_be_accepted_is_not_flown_without(
 
 
 def test_avoidance_without_eyes_is_flown_only_by_who_says_without(
-    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+    made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
 ) -> None:
     def row_of(bench: Bench) -> CheckRow:
         assert bench.desk.state.preflight is not None
         return next(row for row in bench.desk.state.preflight.rows if row.code == "avoidance")
 
     async def scenario() -> None:
-        bench = Bench(made, tmp_path / "onboard.json", both)
+        bench = Bench(made, tmp_path / "onboard.json", lanes)
         start = StartFlight(digest=await bench.ready())
         assert row_of(bench).text.startswith("Avoidance is off")
         bench.watch.avoidance = AvoidanceStatus(enabled=True, state="blind")
@@ -238,13 +215,13 @@ def test_avoidance_without_eyes_is_flown_only_by_who_says_without(
 
 
 def test_beside_other_vehicles_nobody_starts_before_it_is_told_what_they_do(
-    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+    made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
 ) -> None:
     def row(state: str, text: str) -> CheckRow:
         return CheckRow.model_validate({"code": "others", "state": state, "text": text})
 
     async def scenario() -> None:
-        bench = Bench(made, tmp_path / "onboard.json", both, is_alone=False)
+        bench = Bench(made, tmp_path / "onboard.json", lanes, is_alone=False)
         await bench.desk.upload(ME, 3)
         state = await bench.desk.check(ME)
         assert state.preflight is not None
@@ -267,10 +244,10 @@ def test_beside_other_vehicles_nobody_starts_before_it_is_told_what_they_do(
 
 
 def test_what_is_not_ready_is_not_uploaded(
-    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+    made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
 ) -> None:
     async def scenario() -> None:
-        bench = Bench(made, tmp_path / "onboard.json", both)
+        bench = Bench(made, tmp_path / "onboard.json", lanes)
         with pytest.raises(StaleRevisionError):
             await bench.desk.upload(ME, 2)
         bench.plan = made.plan(state="running")
@@ -288,10 +265,10 @@ def test_what_is_not_ready_is_not_uploaded(
 
 
 def test_a_vehicle_that_keeps_another_mission_is_not_started(
-    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+    made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
 ) -> None:
     async def scenario() -> None:
-        bench = Bench(made, tmp_path / "onboard.json", both)
+        bench = Bench(made, tmp_path / "onboard.json", lanes)
         bench.vehicle.swaps_two_items = True
         with pytest.raises(TransferError, match="does not hold the mission"):
             await bench.desk.upload(ME, 3)
@@ -310,10 +287,10 @@ def test_a_vehicle_that_keeps_another_mission_is_not_started(
 
 
 def test_one_thing_at_a_time_but_commands_always(
-    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+    made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
 ) -> None:
     async def scenario() -> None:
-        bench = Bench(made, tmp_path / "onboard.json", both)
+        bench = Bench(made, tmp_path / "onboard.json", lanes)
         first = asyncio.create_task(bench.desk.upload(ME, 3))
         while not bench.desk.state.busy:
             await asyncio.sleep(0)
@@ -330,10 +307,10 @@ def test_one_thing_at_a_time_but_commands_always(
 
 
 def test_what_the_link_said_before_the_read_back_is_not_believed_after_it(
-    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+    made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
 ) -> None:
     async def scenario() -> None:
-        bench = Bench(made, tmp_path / "onboard.json", both)
+        bench = Bench(made, tmp_path / "onboard.json", lanes)
         waiting = LinkStatus(time.monotonic(), adopted=QUAD, state="live", mission_state="unknown")
         assert (await bench.desk.upload(ME, 3)).onboard.is_open_plan
         bench.desk.on_link(waiting)
@@ -346,7 +323,7 @@ def test_what_the_link_said_before_the_read_back_is_not_believed_after_it(
 
 
 def test_a_plan_takes_its_fence_along_and_the_next_one_without_takes_it_away(
-    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
+    made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path
 ) -> None:
     lat_deg, lon_deg = made.home
     fence = FenceDoc(
@@ -357,7 +334,7 @@ def test_a_plan_takes_its_fence_along_and_the_next_one_without_takes_it_away(
     fenced = made.document.model_copy(update={"fence": fence})
 
     async def scenario() -> None:
-        bench = Bench(made, tmp_path / "onboard.json", both)
+        bench = Bench(made, tmp_path / "onboard.json", lanes)
         bench.vehicle.parameters |= {"FENCE_ENABLE": 1.0, "FENCE_ACTION": 1.0}
         bench.plan = bench.plan.model_copy(update={"document": fenced})
         bench.vehicle.drops_fences = True
@@ -399,10 +376,10 @@ def test_a_plan_takes_its_fence_along_and_the_next_one_without_takes_it_away(
 
 
 def test_parameters_that_are_written_during_the_check_make_it_void(
-    made: Made, both: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def scenario() -> None:
-        bench = Bench(made, tmp_path / "onboard.json", both)
+        bench = Bench(made, tmp_path / "onboard.json", lanes)
         await bench.desk.upload(ME, 3)
         answered = bench.vehicle.call
 

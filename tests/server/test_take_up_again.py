@@ -23,17 +23,7 @@ from telemetry.topics.messages import FlightStatus, LinkStatus
 from telemetry.topics.onboard_lists import Item
 from telemetry.topics.requests import Pause, TakeUp
 from tests.server.flying_desk_bench import ME, QUAD, Bench, Made
-from tests.server.test_take_up_desk import (  # noqa: F401
-    HOLDS,
-    another_vehicle,
-    flown,
-    hovering,
-    lanes,
-    made,
-    px4_plan,
-    runner,
-    with_document,
-)
+from tests.server.test_take_up_desk import HOLDS, another_vehicle, flown, hovering, px4_plan, with_document
 
 pytestmark = pytest.mark.xdist_group("flying-desk")
 Scenario = Callable[[Bench], Awaitable[None]]
@@ -42,7 +32,7 @@ AGAIN = TakeUpPlan(revision=3)
 
 
 @pytest.fixture
-def play(made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path) -> Play:  # noqa: F811
+def play(made: Made, lanes: tuple[Lane, Lane], runner: asyncio.Runner, tmp_path: Path) -> Play:
     def played(scenario: Scenario) -> None:
         async def whole() -> None:
             await scenario(await flown(made, tmp_path, lanes))

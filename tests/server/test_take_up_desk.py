@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -37,27 +37,6 @@ from tests.server.flying_desk_bench import ME, Bench, Made
 
 pytestmark = pytest.mark.xdist_group("flying-desk")
 HOLDS = "The vehicle holds, and the mission before is still on board"
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Made]:
-    made = Made(tmp_path_factory.mktemp("data"))
-    yield made
-    made.library.close()
-
-
-@pytest.fixture(scope="module")
-def runner() -> Iterator[asyncio.Runner]:
-    with asyncio.Runner() as made:
-        yield made
-
-
-@pytest.fixture(scope="module")
-def lanes(runner: asyncio.Runner) -> Iterator[tuple[Lane, Lane]]:
-    lanes = Lane("plan"), Lane("flight")
-    yield lanes
-    for lane in lanes:
-        runner.run(lane.close())
 
 
 def hovering(made: Made, *, east_m: float = 8.0, north_m: float = 8.0, up_m: float = 25.0, **more: Any) -> VehicleState:

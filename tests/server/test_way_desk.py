@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -34,26 +33,6 @@ from tests.server.fakes import Told
 from tests.server.flying_desk_bench import ME, Made, Vehicle
 
 pytestmark = pytest.mark.xdist_group("flying-desk")
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Made]:
-    made = Made(tmp_path_factory.mktemp("data"))
-    yield made
-    made.library.close()
-
-
-@pytest.fixture(scope="module")
-def runner() -> Iterator[asyncio.Runner]:
-    with asyncio.Runner() as made:
-        yield made
-
-
-@pytest.fixture(scope="module")
-def lane(runner: asyncio.Runner) -> Iterator[Lane]:
-    lane = Lane("flight")
-    yield lane
-    runner.run(lane.close())
 
 
 class Bench:
