@@ -1,4 +1,4 @@
-"""A flight held against its fence: by hand, and against a brute force of a thousand random fences and flights."""
+"""A flight held against its fence: by hand, and against a brute force of hundreds of random fences and flights."""
 
 from __future__ import annotations
 
@@ -164,12 +164,12 @@ def test_a_floor_above_the_ceiling_is_refused() -> None:
         fence([], [], floor_rel_home_m=50.0, ceiling_rel_home_m=50.0, where="test")
 
 
-def test_a_thousand_random_fences_against_the_brute_force() -> None:
+def test_hundreds_of_random_fences_against_the_brute_force() -> None:
     """No flight that passes crosses anything, and none is refused that keeps a hand's breadth more than the margin."""
     passed = refused = 0
     wrong: list[tuple[int, str]] = []
     plane = plane_about(HOME)
-    for seed in range(1000):
+    for seed in range(300):
         rng = np.random.default_rng(seed)
         flown, shapes = _random_flight(rng), _random_fence(rng)
         verdict = judge_fence(shapes, flown)
@@ -183,8 +183,8 @@ def test_a_thousand_random_fences_against_the_brute_force() -> None:
         if not verdict.keeps and kept_m > MARGIN_M + 0.4 + _circle_slack_m(shapes):
             wrong.append((seed, f"refused, but keeps {kept_m:.3f} m: {verdict.faults}"))
     assert wrong == []
-    assert passed > 100
-    assert refused > 100
+    assert passed > 30
+    assert refused > 30
 
 
 def _circle_slack_m(shapes: Fence) -> float:
@@ -222,7 +222,7 @@ def _star(rng: np.random.Generator, centre: np.ndarray, size_m: float, *, inclus
 def test_one_triangle_over_all_edges_at_once_is_as_near_as_edge_by_edge() -> None:
     rng = np.random.default_rng(7)
     zeros = 0
-    for _ in range(300):
+    for _ in range(100):
         count = int(rng.integers(3, 40))
         angles = np.sort(rng.uniform(0.0, 2.0 * math.pi, count))
         corners_m = (rng.uniform(5.0, 60.0, count) * np.array([np.sin(angles), np.cos(angles)])).T
@@ -232,4 +232,4 @@ def test_one_triangle_over_all_edges_at_once_is_as_near_as_edge_by_edge() -> Non
             expected_m = float(to_polygon(triangle_m[None], corners_m, inclusion=inclusion).distance_m[0])
             assert one_to_polygon(triangle_m, corners_m, inclusion=inclusion) == pytest.approx(expected_m, abs=1e-9)
             zeros += expected_m == 0.0
-    assert 100 < zeros < 500
+    assert 33 < zeros < 166
