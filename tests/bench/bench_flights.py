@@ -6,7 +6,6 @@ that), many times as fast as in reality. What is judged is where the vehicle tru
 
 from __future__ import annotations
 
-import asyncio
 import math
 import sys
 from dataclasses import dataclass, replace
@@ -37,6 +36,7 @@ from telemetry.topics.messages import FlightStatus, Topic, VehicleText
 from telemetry.topics.requests import Operator
 from telemetry.topics.vehicle import VehicleState
 from tests.conftest import ROOT
+from tests.telemetry.own_time import run
 from tests.telemetry.small_bus import SmallBus
 
 TERRAINS = ("coromandel/coromandel_dsm_050.tif", "campus/dsm.tif")
@@ -107,7 +107,7 @@ def fly_seed(model: Path, seed: int) -> Flown:
     """Plan a certified mission from this seed and fly it."""
     dsm = read_dsm(model)
     plan = certified_plan(dsm, seed)
-    return asyncio.run(_flown(model, dsm, plan, seed))
+    return run(lambda: _flown(model, dsm, plan, seed))
 
 
 def certified_plan(dsm: Dsm, seed: int) -> Plan:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import time
 from dataclasses import replace
 from typing import Any
@@ -16,6 +15,7 @@ from telemetry.topics.onboard_lists import OnboardMission, UploadReport
 from telemetry.topics.requests import Connect, Operator, ReadParameters, StartAuto, StartGuided, Upload
 from telemetry.topics.vehicle import VehicleState
 from tests.server.flight_logs import PLAIN, ROUTE, mission
+from tests.telemetry.own_time import run
 from tests.telemetry.small_bus import SmallBus
 from tests.telemetry.test_preflight import state_at
 
@@ -93,4 +93,4 @@ class Heard:
 
 def flown(pilot: Pilot, options: FlyOptions = OPTIONS, flight=PLANNED) -> tuple[FlyResult, Heard]:
     heard = Heard()
-    return asyncio.run(fly(pilot, pilot.bus, flight, options, heard)), heard
+    return run(lambda: fly(pilot, pilot.bus, flight, options, heard)), heard

@@ -25,6 +25,7 @@ from telemetry.topics.messages import ConnectionStatus, ErrorInfo, FlightStatus,
 from telemetry.topics.requests import Connect, ReadParameters, ReturnHome, StartAuto, StartGuided, TickPoint, Upload
 from tests.server.flight_logs import PLAIN
 from tests.telemetry.fly_bench import ADDRESS, OPTIONS, PLANNED, VEHICLE, Heard, Pilot, flown
+from tests.telemetry.own_time import run
 from tests.telemetry.small_bus import SmallBus
 from tests.telemetry.test_preflight import hill, state_at
 
@@ -142,7 +143,7 @@ def test_a_vehicle_that_is_not_ready_is_waited_for() -> None:
             tasks.create_task(becomes_ready())
             return await fly(pilot, pilot.bus, PLANNED, replace(OPTIONS, ready_s=60.0), Heard())
 
-    assert asyncio.run(later()).completed
+    assert run(later).completed
 
 
 def test_refused_arming_is_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -160,7 +161,7 @@ def test_refused_for_good() -> None:
     pilot.refusals = [RefusedError("The vehicle refused to arm.")] * 100
     heard = Heard()
     with pytest.raises(RefusedError):
-        asyncio.run(fly(pilot, pilot.bus, PLANNED, replace(OPTIONS, ready_s=0.0), heard))
+        run(lambda: fly(pilot, pilot.bus, PLANNED, replace(OPTIONS, ready_s=0.0), heard))
     assert heard.refused
 
 
@@ -271,7 +272,7 @@ def test_going_home_on_request_and_words_on_the_way(monkeypatch: pytest.MonkeyPa
             tasks.create_task(on_the_way())
             return await fly(pilot, pilot.bus, PLANNED, OPTIONS, heard, go_home=go_home)
 
-    result = asyncio.run(flight())
+    result = run(flight)
     assert not result.completed
     assert len(pilot.of(ReturnHome)) == 1
     for line in ("Vehicle: Battery low", "Communication lost: the vehicle flies on by itself", "Communication is back"):
@@ -304,7 +305,7 @@ def test_a_return_that_is_not_obeyed_is_commanded_again_and_the_flight_watched_o
         go_home.set()
         return await fly(pilot, pilot.bus, PLANNED, OPTIONS, heard, go_home=go_home)
 
-    assert not asyncio.run(flight()).completed
+    assert not run(flight).completed
     assert len(pilot.of(ReturnHome)) == 2
     assert any("commanded again" in line for line in heard.lines)
 
@@ -334,7 +335,7 @@ def test_a_vehicle_that_took_off_although_the_start_went_wrong_is_watched_to_the
         return await fly(pilot, pilot.bus, PLANNED, OPTIONS, heard, go_home=go_home)
 
     with pytest.raises(SilentError, match="No answer"):
-        asyncio.run(flight())
+        run(flight)
     assert len(pilot.of(ReturnHome)) == 1
     assert any("the vehicle is armed" in line for line in heard.lines)
 
