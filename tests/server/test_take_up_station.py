@@ -16,7 +16,7 @@ from tests.server.station import PATIENCE_S, Station, ok, station
 pytestmark = [pytest.mark.xdist_group("real-time"), pytest.mark.slow]
 
 LONG_S = 3 * PATIENCE_S
-SPEEDUP = 6.0
+SPEEDUP = 12.0
 PX4_QUICK = ("--parameter=MPC_LAND_SPEED=1.5", "--parameter=MPC_LAND_CRWL=1.0")
 PX4 = {"firmware": "px4"}
 
