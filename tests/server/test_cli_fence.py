@@ -30,7 +30,7 @@ RALLY = (RallyPoint(round(LAT + 1e-4, 7), round(LON, 7), 30.5),)
 
 @pytest.fixture(scope="module")
 def link() -> Iterator[str]:
-    with simulated_vehicle(f"{LAT:.7f},{LON:.7f},100", "--boot-s", 1, "--speedup", 10) as where:
+    with simulated_vehicle(f"{LAT:.7f},{LON:.7f},100", "--boot-s", 1) as where:
         yield where
 
 

@@ -37,7 +37,7 @@ ABOUT = """<paramfile><vehicles><parameters name="ArduCopter">
 
 @pytest.fixture(scope="module")
 def link() -> Iterator[str]:
-    with simulated_vehicle(HOME, "--boot-s", 1, "--speedup", 10) as link:
+    with simulated_vehicle(HOME, "--boot-s", 1) as link:
         yield link
 
 

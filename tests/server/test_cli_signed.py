@@ -39,7 +39,7 @@ def test_with_the_keys_of_its_data_directory_it_is_obeyed_and_without_it_is_not(
     def upload(link: str, *options: object) -> Run:
         return hedgehop("upload", flight, "--link", link, "--json", *options)
 
-    with simulated_vehicle(HOME, "--boot-s", 1, "--speedup", 10) as link:
+    with simulated_vehicle(HOME, "--boot-s", 1) as link:
         asyncio.run(set_up(link, data))
         for _ in range(2):  # the second does not repeat what the first has signed
             signed = upload(link, "--data-dir", data)
