@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -58,14 +58,19 @@ def store_terrain(
     spikes: Sequence[SpikeDoc] = (),
     warnings: Sequence[str] = (),
     cloud: CloudDoc | None = None,
+    fill: Callable[[Path], None] = lambda folder: None,
 ) -> TerrainDoc:
-    """Adds a model to the data directory ``root``, from any process; raises ``StorageFullError``."""
+    """Adds a model to the data directory ``root``, from any process; raises ``StorageFullError``.
+
+    ``fill`` writes what lies beside it before it counts as stored.
+    """
     terrain_id = new_id()
     t = dsm.transform
     doc = _describe(dsm, terrain_id, name=name, origin=origin, spikes=spikes, warnings=warnings)
     doc = doc.model_copy(update={"cloud": cloud})
     with new_directory(root / FOLDER / terrain_id) as folder:
         write_array(folder / _ELEVATION, dsm.elevation_m)
+        fill(folder)
         source = write_cells(folder, dsm.source) if dsm.source else None
         transform = (t.a, t.b, t.c, t.d, t.e, t.f)
         write_manifest(folder, TerrainManifest(doc=doc, transform=transform, crs_wkt=dsm.crs.to_wkt(), source=source))

@@ -24,11 +24,14 @@ from server.library.orthophotos import store_orthophoto
 from server.library.shelf import read_manifest
 from server.library.terrains import Origin, TerrainManifest, load_terrain, spike_docs, store_terrain
 from server.plan import archives
+from server.plan.cloud_points import copy_points
 from server.plan.cloud_task import import_cloud
 from server.plan.tile_archive import unpacked_tiles
 from server.schemas import OrthophotoDoc, PlanDoc, TerrainDoc
 from server.work.jobs import Progress
 
+_HEIGHTS_OF_BEFORE = {"canopy_greatest_m": None, "canopy_median_m": None, "canopy_share": None}
+"""Told of a cloud's cells, spikes and all."""
 _STAGES = {"digest": "Reading", "decode": "Reading", "resample": "Resampling", "spikes": "Looking for spikes"}
 
 
@@ -151,6 +154,8 @@ def without_spikes(root: Path, terrain_dir: Path, *, report: Progress) -> Terrai
         name=f"{before.name} without spikes",
         origin=Origin(before.folder, before.file_utc),
         warnings=[*before.warnings, f"{len(spikes)} isolated spikes and pits were removed."],
+        cloud=None if before.cloud is None else before.cloud.model_copy(update=_HEIGHTS_OF_BEFORE),
+        fill=lambda folder: copy_points(terrain_dir, folder),
     )
 
 

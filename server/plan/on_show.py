@@ -86,9 +86,18 @@ class OnShow:
         self.draw()
 
     def tell_legend(self) -> None:
-        """The heights that the colours mean change with the surface model on show."""
+        """The heights that the colours mean, and the points there are, change with the surface model on show."""
         low_m, high_m = self._picture.legend_m or (None, None)
-        self.view = self.view.model_copy(update={"legend_min_m": low_m, "legend_max_m": high_m})
+        cloud = self._picture.cloud
+        self.view = self.view.model_copy(
+            update={
+                "legend_min_m": low_m,
+                "legend_max_m": high_m,
+                "points_shown": 0 if cloud is None else cloud.shown,
+                "points_of": 0 if cloud is None else cloud.points,
+                "points_colored": cloud is not None and cloud.colored,
+            }
+        )
         self._pages.publish(ViewMessage(view=self.view))
 
     def draw(self) -> None:

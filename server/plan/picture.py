@@ -13,11 +13,29 @@ from planning.terrain.dsm import Dsm
 from server.errors import JobCancelledError, NotFoundError, reported
 from server.library import Library
 from server.plan import tasks
-from server.scene.geometry.payload import OverlayScene, PlanScene, ReviewScene, SceneState, SiteMark, TerrainScene
+from server.scene.geometry.payload import (
+    OverlayScene,
+    PlanScene,
+    PointsScene,
+    ReviewScene,
+    SceneState,
+    SiteMark,
+    TerrainScene,
+)
 from server.scene.geometry.plain import plain_around, plain_scene
 from server.scene.layers.vehicles import actor_of
 from server.scene.view import SceneView
-from server.schemas import CursorMessage, ErrorDoc, FrameView, NoticeMessage, Pages, PlanDoc, SelectionDoc, ViewDoc
+from server.schemas import (
+    CloudDoc,
+    CursorMessage,
+    ErrorDoc,
+    FrameView,
+    NoticeMessage,
+    Pages,
+    PlanDoc,
+    SelectionDoc,
+    ViewDoc,
+)
 from server.work.jobs import Lane
 
 log = logging.getLogger("hedgehop.scene")
@@ -49,12 +67,24 @@ class Picture:
         self._terrain: TerrainScene | None = None
         self._terrain_key: tuple[str | None, str | None, str] | None = None
         self._dsm: Dsm | None = None
+        self._points: PointsScene | None = None
+        self._points_of: str | None = None
+        """Model whose points were asked for: those that cannot be had are asked for once."""
         self._overlay: tuple[OverlayScene | None, tuple[SiteMark, ...]] = (None, ())
 
     @property
     def legend_m(self) -> tuple[float, float] | None:
         """Lowest and highest height of the colours on show."""
         return None if self._terrain is None else (self._terrain.legend_min_m, self._terrain.legend_max_m)
+
+    @property
+    def cloud(self) -> CloudDoc | None:
+        """That of the surface model on show, where its points can be drawn."""
+        terrain_id = None if self._terrain is None or self._terrain_key is None else self._terrain_key[0]
+        if terrain_id is None:
+            return None
+        cloud = next((doc.cloud for doc in self._library.terrains() if doc.id == terrain_id), None)
+        return cloud if cloud is not None and cloud.shown else None
 
     @property
     def dsm(self) -> Dsm | None:
@@ -118,6 +148,7 @@ class Picture:
             await self._load_own(ground, None if review is None else review.drawn)
         else:
             await self._load_terrain(document.terrain_id, document.orthophoto_id, view.shading)
+        await self._load_points(wanted=view.show_points)
         overlay, sites = self._overlay
         if overlay is None or overlay.terrain_id != document.terrain_id:
             overlay, sites = None, ()
@@ -131,6 +162,7 @@ class Picture:
             review=review,
             overlay=overlay,
             sites=sites,
+            points=self._points,
         )
         await self._view.show(self._dsm, state)
 
@@ -182,6 +214,29 @@ class Picture:
             pass
         except Exception as error:
             self._tell(reported(error, log, "Drawing the surface model"))
+
+    async def _load_points(self, *, wanted: bool) -> None:
+        """Those of the model on show; of another one they are let go."""
+        terrain = self._terrain
+        terrain_id = None if terrain is None or self.cloud is None else terrain.terrain_id
+        if terrain_id == self._points_of:
+            return
+        self._points, self._points_of = None, None
+        if terrain is None or terrain_id is None or not wanted:
+            return
+        self._points_of = terrain_id
+        try:
+            directory = self._library.terrain_dir(terrain_id)
+            legend_m = terrain.legend_min_m, terrain.legend_max_m
+            self._points = await self._lane.call(tasks.draw_points, terrain_id, directory, *legend_m)
+        except JobCancelledError:
+            self._points_of = None
+            self._wake.set()
+        except NotFoundError:
+            # The model is gone, and whoever computes the plan says so.
+            pass
+        except Exception as error:
+            self._tell(reported(error, log, "Drawing the points"))
 
     def _tell(self, error: ErrorDoc) -> None:
         self._pages.publish(NoticeMessage(level="error", error=error))

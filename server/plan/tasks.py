@@ -37,8 +37,10 @@ from server.library.seen_columns import (
     store_seen,
 )
 from server.library.terrains import load_terrain
+from server.plan.cloud_points import read_points
 from server.plan.profile_chart import chart
-from server.scene.geometry.payload import PlanScene, TerrainScene
+from server.scene.geometry.payload import PlanScene, PointsScene, TerrainScene
+from server.scene.geometry.points_payload import build_points_scene
 from server.scene.geometry.relief import kept_within, relief
 from server.scene.geometry.terrain_payload import Shading, build_terrain_scene
 from server.scene.mirror import Voxels
@@ -156,6 +158,12 @@ def draw_terrain(
     """The surface model as the 3D view draws it."""
     photo = None if photo_directory is None else load_orthophoto(photo_directory)
     return build_terrain_scene(terrain_id, _terrain(directory), shading=shading, orthophoto=photo, report=report)
+
+
+def draw_points(terrain_id: str, directory: Path, low_m: float, high_m: float, *, report: Progress) -> PointsScene:
+    """The points of a surface model's cloud as the 3D view draws them."""
+    report("Drawing the points", None)
+    return build_points_scene(terrain_id, _terrain(directory), read_points(directory), low_m=low_m, high_m=high_m)
 
 
 def _plan(directory: Path, document: PlanDoc, report: Progress) -> tuple[Plan, Dsm, dict[str, float]]:

@@ -48,6 +48,11 @@ class CloudDoc(Strict):
     """Holes that a plan fills with the highest cell around them."""
     small_holes_m2: float
     small_hole_limit_m2: float
+    shown: int = 0
+    """Points that were kept to be looked at; 0 of models that were read before any were."""
+    voxel_m: float = 0.0
+    """Edge of the voxels of which each kept one point."""
+    colored: bool = False
 
 
 class TerrainDoc(Strict):

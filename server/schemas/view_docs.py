@@ -15,6 +15,10 @@ class ViewDoc(Strict):
     """What the 3D view shows; shared by all pages, not part of the plan."""
 
     shading: Literal["height", "hillshade", "orthophoto"] = "height"
+    show_points: bool = False
+    """The points of the cloud that the surface model on show was made of."""
+    show_mesh: bool = True
+    """The surface model itself beside its points; without them it is always shown."""
     show_surface: bool = True
     show_path: bool = True
     show_unknown: bool = True
@@ -36,6 +40,12 @@ class ViewDoc(Strict):
     vertical_exaggeration: Annotated[float, Field(ge=1, le=5)] = 1.0
     legend_min_m: float | None = None
     legend_max_m: float | None = None
+    points_shown: int = 0
+    """Points that the surface model on show has to draw; 0: it has none."""
+    points_of: int = 0
+    """Points of the file that they are of."""
+    points_colored: bool = False
+    """By the file; else by height, as the model is."""
 
 
 class SelectionDoc(Strict):

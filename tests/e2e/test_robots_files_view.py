@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.stations import Station
-from tests.e2e.steps import choose, visit
+from tests.e2e.steps import choose, drawn, visit
 from tests.planning.cloud_samples import some_points, write_las
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
@@ -30,3 +31,13 @@ def test_a_cloud_without_a_system_asks_for_it_and_becomes_a_model(station: Stati
     expect(facts).to_contain_text("0.25 m, as chosen")
     expect(facts).to_contain_text("noise")
     expect(facts).to_contain_text("ground")
+    drawn(page)
+    expect(page.get_by_test_id("layer-mesh")).to_have_count(0)
+    page.get_by_test_id("layer-points").click()
+    expect(page.get_by_test_id("points-drawn")).to_have_text(re.compile(r"^\d[\d\u202f]+ of \d[\d\u202f]+ points$"))
+    expect(page.get_by_test_id("layer-mesh")).to_have_attribute("aria-pressed", "false")
+    page.reload()
+    expect(page.get_by_test_id("layer-points")).to_have_attribute("aria-pressed", "true")
+    page.get_by_test_id("layer-points").click()
+    expect(page.get_by_test_id("points-drawn")).to_have_count(0)
+    expect(page.get_by_test_id("layer-mesh")).to_have_count(0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,10 @@ import numpy as np
 import pytest
 
 from planning.errors import MissingCrsError, ParameterError, RasterError, RasterTooLargeError
+from server.errors import NotFoundError, StorageError
 from server.library.terrains import Origin, load_terrain
-from server.plan.file_tasks import import_terrain
+from server.plan.cloud_points import read_points
+from server.plan.file_tasks import import_terrain, without_spikes
 from server.schemas import TerrainDoc
 from tests.planning.cloud_samples import CORNER, some_points, write_las, write_ply
 
@@ -39,7 +42,7 @@ def test_a_cloud_becomes_a_model_that_says_where_it_came_from(tmp_path: Path) ->
     (tmp_path / "terrains").mkdir()
     upload = write_las(tmp_path / "0123.laz", xyz, classes)
     doc, stages = imported(tmp_path, upload)
-    assert stages == ["Sorting the points", "Looking for spikes", "Looking for holes", "Storing"]
+    assert stages == ["Sorting the points", "Thinning the points", "Looking for spikes", "Looking for holes", "Storing"]
     assert (doc.name, doc.vertical_datum, doc.resolution_m) == ("survey.laz", "EGM96 height", 0.5)
     cloud = doc.cloud
     assert cloud is not None
@@ -52,6 +55,15 @@ def test_a_cloud_becomes_a_model_that_says_where_it_came_from(tmp_path: Path) ->
     assert any("noise were left out" in warning for warning in doc.warnings)
     stored = load_terrain(tmp_path / "terrains" / doc.id)
     assert np.nanmax(stored.elevation_m) == pytest.approx(CORNER[2] + 30.0, abs=0.01)
+
+    points = read_points(tmp_path / "terrains" / doc.id)
+    assert (cloud.shown, cloud.colored) == (len(points.xyz_m), False)
+    assert cloud.shown == len(xyz) - 1
+    assert points.xyz_m[:, 2].max() == pytest.approx(CORNER[2] + 30.0)
+    bare = without_spikes(tmp_path, tmp_path / "terrains" / doc.id, report=lambda stage, share: None)
+    assert bare.cloud is not None
+    assert (bare.cloud.shown, bare.cloud.canopy_greatest_m) == (cloud.shown, None)
+    assert np.array_equal(read_points(tmp_path / "terrains" / bare.id).xyz_m, points.xyz_m)
 
     again, _ = imported(tmp_path, upload, remove_spikes=True, cell_m=1.0, keep_noise=True)
     assert again.cloud is not None
@@ -77,6 +89,23 @@ def test_what_is_wrong_is_said_of_the_operators_own_file(tmp_path: Path) -> None
             imported(tmp_path, upload, **said)
         assert upload.stem not in str(caught.value)
     assert not (tmp_path / "terrains").exists()
+
+
+def test_points_that_were_never_kept_or_are_damaged_are_said(tmp_path: Path) -> None:
+    xyz, classes = some_points(4, 300)
+    (tmp_path / "terrains").mkdir()
+    doc, _ = imported(tmp_path, write_las(tmp_path / "a.las", xyz, classes))
+    folder = tmp_path / "terrains" / doc.id
+    (folder / "points.npy").write_bytes(b"no array")
+    with pytest.raises(StorageError, match="damaged"):
+        read_points(folder)
+    manifest = folder / "manifest.json"
+    told = json.loads(manifest.read_text())
+    for name in ("shown", "voxel_m", "colored"):  # as those that were stored before points were kept
+        del told["doc"]["cloud"][name]
+    manifest.write_text(json.dumps(told))
+    with pytest.raises(NotFoundError, match="No points"):
+        read_points(folder)
 
 
 def test_rasters_are_asked_for_no_cells(tmp_path: Path) -> None:

@@ -51,7 +51,9 @@ def test_a_recording_is_drawn_on_it_and_the_plan_comes_back_afterwards() -> None
         drawn.append((dsm, state))
 
     dsm = hill()
-    library: Any = SimpleNamespace(orthophotos=list, terrain_dir=lambda _: None, load_terrain=lambda _: dsm)
+    library: Any = SimpleNamespace(
+        orthophotos=list, terrains=list, terrain_dir=lambda _: None, load_terrain=lambda _: dsm
+    )
 
     async def call(*_: object) -> object:
         return state_over(dsm).terrain

@@ -22,6 +22,10 @@ export function withUnit(value: number | null | undefined, unit: string, decimal
   return known(value) ? `${number(value, decimals)}\u00a0${unit}` : DASH;
 }
 
+/** Of many things, in few digits: 300,000 and 12.5 M. */
+export const many = (value: number) =>
+  value < 1e6 ? number(value) : `${number(value / 1e6, value < 1e8 ? 1 : 0)}\u00a0M`;
+
 export const metres = (value: number | null | undefined, decimals = 1) => withUnit(value, "m", decimals);
 
 /** A distance to the ground, rounded down to centimetres: no clearance is flattered. */

@@ -1191,6 +1191,11 @@ export interface CloudDoc {
   small_holes: number;
   small_holes_m2: number;
   small_hole_limit_m2: number;
+  /** Points that were kept to be looked at; 0 of models that were read before any were. */
+  shown: number;
+  /** Edge of the voxels of which each kept one point. */
+  voxel_m: number;
+  colored: boolean;
 }
 
 export interface TerrainDoc {
@@ -1258,6 +1263,10 @@ export interface JobDoc {
 /** What the 3D view shows; shared by all pages, not part of the plan. */
 export interface ViewDoc {
   shading: "height" | "hillshade" | "orthophoto";
+  /** The points of the cloud that the surface model on show was made of. */
+  show_points: boolean;
+  /** The surface model itself beside its points; without them it is always shown. */
+  show_mesh: boolean;
   show_surface: boolean;
   show_path: boolean;
   show_unknown: boolean;
@@ -1279,6 +1288,12 @@ export interface ViewDoc {
   vertical_exaggeration: number;
   legend_min_m: number | null;
   legend_max_m: number | null;
+  /** Points that the surface model on show has to draw; 0: it has none. */
+  points_shown: number;
+  /** Points of the file that they are of. */
+  points_of: number;
+  /** By the file; else by height, as the model is. */
+  points_colored: boolean;
 }
 
 /** Which tool clicks in the 3D view act through, and what is selected. */

@@ -26,6 +26,17 @@ describe("numbers", () => {
   });
 });
 
+describe("counts", () => {
+  it.each([
+    [300_000, "300\u202f000"],
+    [1_000_000, "1.0\u00a0M"],
+    [12_540_000, "12.5\u00a0M"],
+    [100_400_000, "100\u00a0M"],
+  ])("%d is %s", (value, text) => {
+    expect(f.many(value)).toBe(text);
+  });
+});
+
 describe("places", () => {
   it("have 7 decimals and can be pasted", () => {
     expect(f.latLon({ lat_deg: -36.8421337, lon_deg: 175.5 })).toBe("-36.8421337, 175.5000000");

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Protocol
 
-from mapping.geometry.arrays import F64, U8
+from mapping.geometry.arrays import F64, U8, U16
 
-Chunk = tuple[F64, U8 | None]
-"""(N, 3) x, y, z in the file's units, and (N,) ASPRS classes where it has them."""
+Chunk = tuple[F64, U8 | None, U16 | None]
+"""(N, 3) x, y, z in the file's units, (N,) ASPRS classes where it has them, and (N, 3) red, green, blue where it has
+them and they were asked for: of 8 bits or of 16, all points of a file alike."""
 Box = tuple[float, float, float, float]
 """Least x and y, greatest x and y, in the file's units."""
 CHUNK = 1_000_000
@@ -47,6 +48,6 @@ class Cloud(Protocol):
     @property
     def notes(self) -> tuple[str, ...]: ...
 
-    def chunks(self) -> Iterator[Chunk]:
+    def chunks(self, *, colors: bool) -> Iterator[Chunk]:
         """RasterFormatError when there are fewer points than the header says."""
         ...

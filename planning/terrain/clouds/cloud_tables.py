@@ -9,7 +9,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from mapping.geometry.arrays import F64, U8
+from mapping.geometry.arrays import F64, U8, U16
 from planning.errors import RasterFormatError
 from planning.terrain.clouds.cloud import CHUNK, Box, Chunk
 
@@ -21,6 +21,7 @@ _PLY_TYPES = {
 }  # fmt: skip
 _PLY_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _PCD_KINDS = {"F": "f", "I": "i", "U": "u"}
+_THREE, _ONE = (("red", "green", "blue"), ("r", "g", "b")), ("rgb", "rgba")
 _CLASSES = ("classification", "scalar_classification", "class")
 
 
@@ -36,6 +37,8 @@ class Table:
     fields: np.dtype
     columns: tuple[int, ...]
     """Of x, y, z and, where there is one, the class: the numbers of a row of text, or the fields of a binary one."""
+    colors: tuple[int, ...] = ()
+    """The same of red, green and blue, or of one number of four bytes that holds them."""
     notes: tuple[str, ...] = ()
     bounds: Box | None = None
     crs_wkt: str | None = None
@@ -52,23 +55,31 @@ class Table:
         names = self.fields.names or ()
         return not self.text and any(self.fields[names[at]] == np.dtype("f4") for at in self.columns[:2])
 
-    def chunks(self) -> Iterator[Chunk]:
+    def chunks(self, *, colors: bool) -> Iterator[Chunk]:
         """RasterFormatError when there are fewer points than the header says."""
         with self.path.open("rb") as file:
             file.seek(self.start)
             for first in range(0, self.rows, CHUNK):
                 count = min(CHUNK, self.rows - first)
-                numbers = self._text(file, count) if self.text else self._binary(file, count)
+                numbers, shades = (self._text if self.text else self._binary)(file, count)
                 if len(numbers) < count:
                     raise RasterFormatError(
                         f"It ends after {first + len(numbers):,} of {self.rows:,} points.", advice="Copy it again."
                     )
-                yield numbers[:, :3], _classes(numbers)
+                yield numbers[:, :3], _classes(numbers), _rgb(shades) if colors and self.colors else None
 
-    def _text(self, file: BinaryIO, count: int) -> F64:
-        return np.loadtxt(file, max_rows=count, usecols=self.columns, ndmin=2, comments=None)
+    def _text(self, file: BinaryIO, count: int) -> tuple[F64, list[np.ndarray]]:
+        columns = (*self.columns, *self.colors)
+        numbers = np.loadtxt(file, max_rows=count, usecols=columns, ndmin=2, comments=None)
+        names = self.fields.names or ()
+        with np.errstate(invalid="ignore", over="ignore"):
+            shades = [
+                shade.astype(self.fields[names[at]])
+                for at, shade in zip(self.colors, numbers.T[len(self.columns) :], strict=True)
+            ]
+        return numbers[:, : len(self.columns)], shades
 
-    def _binary(self, file: BinaryIO, count: int) -> F64:
+    def _binary(self, file: BinaryIO, count: int) -> tuple[F64, list[np.ndarray]]:
         data = file.read(count * self.fields.itemsize)
         whole = len(data) // self.fields.itemsize
         rows = np.frombuffer(data, self.fields, count=whole)
@@ -76,7 +87,7 @@ class Table:
         out = np.empty((whole, len(self.columns)))
         for to, at in enumerate(self.columns):
             out[:, to] = rows[names[at]]
-        return out
+        return out, [rows[names[at]] for at in self.colors]
 
 
 def ply_table(path: Path) -> Table:
@@ -98,7 +109,8 @@ def ply_table(path: Path) -> Table:
     names = [words[2] for words in properties]
     types = [_PLY_ORDERS[order] + _PLY_TYPES[words[1]] for words in properties]
     fields, columns = _fields(names, types, [1] * len(names))
-    return Table(path, start, _count(vertex[2:3]), order == "ascii", fields, columns)
+    colors = _colors(names, fields)
+    return Table(path, start, _count(vertex[2:3]), order == "ascii", fields, columns, colors)
 
 
 def pcd_table(path: Path) -> Table:
@@ -122,7 +134,9 @@ def pcd_table(path: Path) -> Table:
         raise RasterFormatError(f"Its numbers have strange sizes: {' '.join(sizes)[:60]}.")
     types = [f"<{_PCD_KINDS[kind]}{size}" for kind, size in zip(kinds, sizes, strict=True)]
     fields, columns = _fields(names, types, counts)
-    return Table(path, start, _count(lines.get("POINTS", [])), data == "ascii", fields, columns, _viewpoint(lines))
+    colors = _colors([name for name, count in zip(names, counts, strict=True) for _ in range(count)], fields)
+    rows = _count(lines.get("POINTS", []))
+    return Table(path, start, rows, data == "ascii", fields, columns, colors, _viewpoint(lines))
 
 
 def _viewpoint(lines: dict[str, list[str]]) -> tuple[str, ...]:
@@ -153,6 +167,26 @@ def _fields(names: list[str], types: list[str], counts: list[int]) -> tuple[np.d
     classes = [name for name in _CLASSES if name in lower][:1]
     fields = np.dtype([(f"f{at}", kind) for at, (_, kind) in enumerate(spread)])
     return fields, tuple(lower.index(name) for name in ("x", "y", "z", *classes))
+
+
+def _colors(names: list[str], fields: np.dtype) -> tuple[int, ...]:
+    """Where whole numbers of one or two bytes are red, green and blue, or one field of four holds them; else ()."""
+    lower = [name.lower() for name in names]
+    choices = [(three, ("u1", "u2")) for three in _THREE] + [((one,), ("u4", "f4", "i4")) for one in _ONE]
+    for wanted, kinds in choices:
+        if set(wanted) <= set(lower):
+            at = tuple(lower.index(name) for name in wanted)
+            if all(fields[f"f{place}"].str[1:] in kinds for place in at):
+                return at
+    return ()
+
+
+def _rgb(shades: list[np.ndarray]) -> U16:
+    """(N, 3), of three fields or of one: 0x00RRGGBB, often called a real number."""
+    if len(shades) == 3:
+        return np.column_stack(shades).astype(np.uint16)
+    packed = np.ascontiguousarray(shades[0]).view(np.dtype("u4").newbyteorder(shades[0].dtype.byteorder))
+    return np.column_stack([(packed >> shift) & 255 for shift in (16, 8, 0)]).astype(np.uint16)
 
 
 def _count(words: list[str]) -> int:

@@ -14,6 +14,7 @@ from planning.terrain.clouds.cloud import Box, Chunk, Cloud
 from planning.terrain.clouds.cloud_header import CloudHeader
 from planning.terrain.clouds.cloud_tables import pcd_table, ply_table
 from planning.terrain.clouds.grid import CloudGrid, Sorter, cell_for, grid_for
+from planning.terrain.clouds.thin import Thinner
 
 Json = dict[str, Any]
 Send = Callable[..., None]
@@ -23,14 +24,16 @@ Ask = Callable[[Json], Json]
 def read_cloud(job: Json, send: Send, ask: Ask) -> None:
     """Heights as raw float32 rows in ``job["target"]`` and, of ground points alone, in ``job["ground"]``; NaN unknown.
 
-    What is asked for: "cell_m" or null, metres of the file's units "xy_m" and "z_m", "max_px", "keep_noise".
+    Thinned points as raw float64 rows in ``job["points"]``, their colours as bytes in ``job["colors"]``. What is asked
+    for: "cell_m" or null, metres of the file's units "xy_m" and "z_m", "max_px", "keep_noise", and "most_points" of
+    the thinned cloud, 0 for none.
     """
     try:
         cloud = _opened(Path(job["source"]), job["format"])
         order = ask(_header(cloud).as_json())
         if cloud.rows == 0:
             raise NoElevationError("It has no points.", advice="Export it again.")
-        sorter = _sorted(cloud, job, order, send)
+        sorter, thinner = _sorted(cloud, job, order, send)
     except RasterError as error:
         send("error", kind=_kind(error), what=error.what, advice=error.advice)
         return
@@ -38,7 +41,7 @@ def read_cloud(job: Json, send: Send, ask: Ask) -> None:
     send(
         "done", west_m=grid.west_m, north_m=grid.north_m, cell_m=grid.cell_m, shape=grid.shape, taken=sorter.taken,
         ground=sorter.ground, noise=sorter.noise, not_numbers=sorter.not_numbers, step_m=_step_m(cloud, grid),
-        classes=sorter.classes.tolist(),
+        classes=sorter.classes.tolist(), **_thinned(thinner, job, send),
     )  # fmt: skip
 
 
@@ -62,14 +65,16 @@ def _header(cloud: Cloud) -> CloudHeader:
     return CloudHeader(cloud.rows, cloud.crs_wkt, cloud.unit, None, classified=cloud.classified, notes=cloud.notes)
 
 
-def _sorted(cloud: Cloud, job: Json, order: Json, send: Send) -> Sorter:
+def _sorted(cloud: Cloud, job: Json, order: Json, send: Send) -> tuple[Sorter, Thinner | None]:
     bounds = _bounds(cloud, order, send)
     grid = grid_for(bounds, order["cell_m"] or cell_for(bounds, cloud.rows), max_px=order["max_px"])
     heights = _empty(job["target"], grid)
     sorter = Sorter(grid, heights, _empty(job["ground"], grid) if cloud.classified else None, order["keep_noise"])
-    done = 0
-    for xyz_m, classes in _in_metres(cloud, order):
-        sorter.add(xyz_m, classes)
+    thinner, done = Thinner.over(bounds, cloud.rows, most=order["most_points"]) if order["most_points"] else None, 0
+    for xyz_m, classes, rgb in _in_metres(cloud, order, colors=thinner is not None):
+        taken = sorter.add(xyz_m, classes)
+        if thinner is not None:
+            thinner.add(xyz_m[taken], None if rgb is None else rgb[taken])
         done += len(xyz_m)
         send("progress", stage="sort", share=done / cloud.rows)
     if sorter.outside:
@@ -83,7 +88,18 @@ def _sorted(cloud: Cloud, job: Json, order: Json, send: Send) -> Sorter:
         if grown is not None:
             grown[np.isneginf(grown)] = np.nan
             grown.flush()  # pyright: ignore[reportAttributeAccessIssue]
-    return sorter
+    return sorter, thinner
+
+
+def _thinned(thinner: Thinner | None, job: Json, send: Send) -> Json:
+    if thinner is None:
+        return {"shown": 0, "colored": False, "voxel_m": 0.0}
+    send("progress", stage="thin", share=0.0)
+    found = thinner.thinned()
+    found.xyz_m.tofile(job["points"])
+    if found.rgb is not None:
+        found.rgb.tofile(job["colors"])
+    return {"shown": len(found.xyz_m), "colored": found.rgb is not None, "voxel_m": found.voxel_m}
 
 
 def _bounds(cloud: Cloud, order: Json, send: Send) -> Box:
@@ -92,7 +108,7 @@ def _bounds(cloud: Cloud, order: Json, send: Send) -> Box:
         west, south, east, north = (value * order["xy_m"] for value in cloud.bounds)
         return west, south, east, north
     least, most, done = np.full(2, np.inf), np.full(2, -np.inf), 0
-    for xyz_m, _ in _in_metres(cloud, order):
+    for xyz_m, _, _ in _in_metres(cloud, order, colors=False):
         xy_m = xyz_m[np.isfinite(xyz_m).all(axis=1), :2]
         if len(xy_m):
             least, most = np.minimum(least, xy_m.min(axis=0)), np.maximum(most, xy_m.max(axis=0))
@@ -103,10 +119,10 @@ def _bounds(cloud: Cloud, order: Json, send: Send) -> Box:
     return float(least[0]), float(least[1]), float(most[0]), float(most[1])
 
 
-def _in_metres(cloud: Cloud, order: Json) -> Iterator[Chunk]:
+def _in_metres(cloud: Cloud, order: Json, *, colors: bool) -> Iterator[Chunk]:
     factors = np.array([order["xy_m"], order["xy_m"], order["z_m"]])
-    for xyz, classes in cloud.chunks():
-        yield xyz * factors, classes
+    for xyz, classes, rgb in cloud.chunks(colors=colors):
+        yield xyz * factors, classes, rgb
 
 
 def _empty(path: str, grid: CloudGrid) -> F32:

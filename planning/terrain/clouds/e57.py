@@ -9,16 +9,18 @@ from typing import Any
 
 import numpy as np
 import pye57
+from pye57 import libe57  # pyright: ignore[reportAttributeAccessIssue]
 from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from mapping.geometry import quaternions
-from mapping.geometry.arrays import F64
+from mapping.geometry.arrays import F32, F64, U16
 from planning.errors import RasterFormatError
 from planning.terrain.clouds.cloud import CHUNK, Box, Chunk
 
 _CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 _SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
+_COLORS = ("colorRed", "colorGreen", "colorBlue")
 _INVALID = {_CARTESIAN: "cartesianInvalidState", _SPHERICAL: "sphericalInvalidState"}
 
 
@@ -36,13 +38,13 @@ class E57File:
     classified: bool = False
     coarse: bool = False
 
-    def chunks(self) -> Iterator[Chunk]:
+    def chunks(self, *, colors: bool) -> Iterator[Chunk]:
         """Points that the scanner calls invalid come as NaN: they are counted, as all that are no places."""
         file = pye57.E57(str(self.path))
         try:
             for number in range(file.scan_count):
-                for xyz_m in _points(file, number):
-                    yield xyz_m, None
+                for xyz_m, rgb in _points(file, number, colors=colors):
+                    yield xyz_m, None, rgb
         finally:
             file.close()
 
@@ -69,7 +71,7 @@ def _reference(file: Any) -> tuple[str | None, str]:
         return None, f'Its reference system is in words that are not understood: "{words[:80]}".'
 
 
-def _points(file: Any, number: int) -> Iterator[F64]:
+def _points(file: Any, number: int, *, colors: bool) -> Iterator[tuple[F64, U16 | None]]:
     header = file.get_header(number)
     present = set(header.point_fields)
     axes = next((kind for kind in (_CARTESIAN, _SPHERICAL) if present.issuperset(kind)), None)
@@ -80,6 +82,7 @@ def _points(file: Any, number: int) -> Iterator[F64]:
     count = min(CHUNK, max(1, header.point_count))
     fields = [name for name in (*axes, _INVALID[axes]) if name in present]
     data, buffers = file.make_buffers(fields, count)
+    shades = _with_shades(file, buffers, count) if colors and present.issuperset(_COLORS) else None
     reader = header.points.reader(buffers)
     read = 0
     try:
@@ -90,12 +93,33 @@ def _points(file: Any, number: int) -> Iterator[F64]:
             if len(fields) > len(axes):
                 # 1: only its direction is meant; 2: nothing of it.
                 xyz_m[np.asarray(data[fields[-1]][:got]) != 0] = np.nan
-            yield xyz_m @ R.T + t_m
+            yield xyz_m @ R.T + t_m, None if shades is None else _rgb(header, shades[:, :got])
     finally:
         reader.close()
     if read < header.point_count:
         what = f"Its scan {number + 1} ends after {read:,} of {header.point_count:,} points."
         raise RasterFormatError(what, advice="Copy it again.")
+
+
+def _with_shades(file: Any, buffers: Any, count: int) -> F32:
+    """(3, count) that the reader fills beside ``buffers``: as reals, for a file has bytes, 16 bits or shares of 1."""
+    shades = np.zeros((3, count), np.float32)
+    for row, name in zip(shades, _COLORS, strict=True):
+        buffers.append(libe57.SourceDestBuffer(file.image_file, name, row, count, True, True))
+    return shades
+
+
+def _rgb(header: Any, shades: F32) -> U16:
+    """(3, N) between the limits that the scan gives, or bytes -> (N, 3) of 8 bits."""
+    limits: Any = header.node["colorLimits"] if header.node.isDefined("colorLimits") else None
+    out = np.zeros((shades.shape[1], 3), np.uint16)
+    for at, (name, shade) in enumerate(zip(_COLORS, shades, strict=True)):
+        ends = (f"{name}Minimum", f"{name}Maximum")
+        given = limits is not None and all(limits.isDefined(end) for end in ends)
+        low, high = (float(limits[end].value()) for end in ends) if given else (0.0, 255.0)
+        share = (shade - low) / (high - low) if high > low else np.zeros_like(shade)
+        out[:, at] = np.round(np.clip(np.nan_to_num(share), 0.0, 1.0) * 255)
+    return out
 
 
 def _pose(header: Any, number: int) -> tuple[F64, F64]:

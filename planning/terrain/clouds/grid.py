@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mapping.geometry.arrays import F32, F64, I64, U8
+from mapping.geometry.arrays import F32, F64, I64, U8, Bools
 from planning.errors import RasterFormatError, RasterTooLargeError
 from planning.terrain.clouds.cloud import Box
 
@@ -70,23 +70,22 @@ class Sorter:
     classes: I64 = field(default_factory=lambda: np.zeros(256, np.int64))
     """(256,) how many of the points that were taken are of each class."""
 
-    def add(self, xyz_m: F64, classes: U8 | None) -> None:
-        """(N, 3) projected x, y and height in metres, and (N,) ASPRS classes."""
-        finite = np.isfinite(xyz_m).all(axis=1)
-        if not finite.all():
-            self.not_numbers += int((~finite).sum())
-            xyz_m, classes = xyz_m[finite], None if classes is None else classes[finite]
+    def add(self, xyz_m: F64, classes: U8 | None) -> Bools:
+        """(N, 3) projected x, y and height in metres, and (N,) ASPRS classes. Returns which of them were taken."""
+        taken = np.isfinite(xyz_m).all(axis=1)
+        self.not_numbers += int((~taken).sum())
         if classes is not None and not self.keep_noise:
-            noise = (classes == NOISE[0]) | (classes == NOISE[1])
-            if noise.any():
-                self.noise += int(noise.sum())
-                xyz_m, classes = xyz_m[~noise], classes[~noise]
+            noise = taken & ((classes == NOISE[0]) | (classes == NOISE[1]))
+            self.noise += int(noise.sum())
+            taken &= ~noise
         cells, inside = self._cells(xyz_m)
-        if not inside.all():
-            self.outside += int((~inside).sum())
-            xyz_m, cells, classes = xyz_m[inside], cells[inside], None if classes is None else classes[inside]
+        self.outside += int((taken & ~inside).sum())
+        taken &= inside
+        self._sort(cells[taken], rounded_up(xyz_m[taken, 2]), None if classes is None else classes[taken])
+        return taken
+
+    def _sort(self, cells: I64, heights_m: F32, classes: U8 | None) -> None:
         self.taken += len(cells)
-        heights_m = rounded_up(xyz_m[:, 2])
         np.maximum.at(self.highest_m.reshape(-1), cells, heights_m)
         if classes is not None and self.ground_m is not None:
             self.classes += np.bincount(classes, minlength=256)
@@ -94,7 +93,7 @@ class Sorter:
             self.ground += int(ground.sum())
             np.maximum.at(self.ground_m.reshape(-1), cells[ground], heights_m[ground])
 
-    def _cells(self, xyz_m: F64) -> tuple[np.ndarray, np.ndarray]:
+    def _cells(self, xyz_m: F64) -> tuple[I64, Bools]:
         rows_count, columns_count = self.grid.shape
         with np.errstate(invalid="ignore", over="ignore"):
             columns = np.floor((xyz_m[:, 0] - self.grid.west_m) / self.grid.cell_m)

@@ -12,6 +12,7 @@ from laspy.vlrs.known import GeoKeyDirectoryVlr
 from pyproj import CRS
 from pyproj.crs import CompoundCRS
 
+from mapping.geometry.arrays import U16
 from planning.errors import RasterFormatError
 from planning.terrain.clouds.cloud import CHUNK, Box, Chunk
 
@@ -40,17 +41,22 @@ class LasFile:
     coarse: bool = False
     notes: tuple[str, ...] = ()
 
-    def chunks(self) -> Iterator[Chunk]:
-        """(N, 3) x, y, z in the file's units, and (N,) classes; deleted ("withheld") points are left out."""
-        read = 0
+    def chunks(self, *, colors: bool) -> Iterator[Chunk]:
+        """Deleted ("withheld") points are left out."""
+        read, needed = 0, _NEEDED | (laspy.DecompressionSelection.RGB if colors else 0)
         # Its types leave this argument out.
-        with laspy.open(self.path, decompression_selection=_NEEDED) as file:  # pyright: ignore[reportCallIssue]
+        with laspy.open(self.path, decompression_selection=needed) as file:  # pyright: ignore[reportCallIssue]
+            colored = colors and "red" in file.header.point_format.dimension_names
             for points in file.chunk_iterator(CHUNK):
                 read += len(points)
                 xyz = np.column_stack([np.asarray(axis) for axis in (points.x, points.y, points.z)])
                 classes = np.asarray(points.classification, dtype=np.uint8)
                 kept = np.asarray(points.withheld) == 0
-                yield (xyz, classes) if kept.all() else (xyz[kept], classes[kept])
+                rgb = _rgb(points) if colored else None
+                if kept.all():
+                    yield xyz, classes, rgb
+                else:
+                    yield xyz[kept], classes[kept], None if rgb is None else rgb[kept]
         if read < self.rows:
             raise RasterFormatError(f"It ends after {read:,} of {self.rows:,} points.", advice="Copy it again.")
 
@@ -61,6 +67,10 @@ def open_las(path: Path) -> LasFile:
         (west, south, _), (east, north, _) = header.mins, header.maxs
         wkt, unit = _reference(header)
         return LasFile(path, header.point_count, (float(west), float(south), float(east), float(north)), wkt, unit)
+
+
+def _rgb(points: laspy.ScaleAwarePointRecord) -> U16:
+    return np.column_stack([np.asarray(points[name], np.uint16) for name in ("red", "green", "blue")])
 
 
 def _reference(header: laspy.LasHeader) -> tuple[str | None, str | None]:

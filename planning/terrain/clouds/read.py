@@ -15,6 +15,7 @@ from pyproj import CRS
 from mapping.geometry.arrays import F32
 from planning.errors import ParameterError, RasterFormatError
 from planning.terrain.clouds.cloud_header import CloudHeader, cloud_format
+from planning.terrain.clouds.thin import ThinnedCloud
 from planning.terrain.dsm import Dsm
 from planning.terrain.rasters import georef, sandbox
 from planning.terrain.rasters.header import RasterLimits
@@ -40,6 +41,8 @@ class CloudParams:
     """Metres per unit of height, where the file's own is not to be believed."""
     keep_noise: bool = False
     """Points that the file calls noise (classes 7 and 18) count as well."""
+    most_points: int = 0
+    """Of the cloud itself, thinned, to be looked at; 0: none."""
     limits: RasterLimits = LIMITS
 
     def __post_init__(self) -> None:
@@ -70,6 +73,8 @@ class CloudModel:
     """(256,) points that were taken, by their class; all 0 where none has one."""
     notes: tuple[str, ...]
     """What was assumed or left out, in plain words."""
+    thinned: ThinnedCloud | None = None
+    """Of the points that were taken, where it was asked for."""
 
 
 def read_cloud(path: Path, params: CloudParams | None = None, *, progress: Progress | None = None) -> CloudModel:
@@ -85,12 +90,12 @@ def read_cloud(path: Path, params: CloudParams | None = None, *, progress: Progr
         return _order(places[0], params, where=path.name)
 
     with sandbox.private_directory() as directory:
-        link, target, ground = (directory / token_hex(8) for _ in range(3))
+        link, target, ground, points, colors = (directory / token_hex(8) for _ in range(5))
         kind = cloud_format(path)
         link.symlink_to(path.resolve())
         job = {
             "job": "read_cloud", "decoder": _DECODER, "format": kind, "source": str(link), "target": str(target),
-            "ground": str(ground),
+            "ground": str(ground), "points": str(points), "colors": str(colors),
         }  # fmt: skip
         found = sandbox.run_job(
             job, directory=directory, limits=params.limits, where=path.name, on_header=order,
@@ -99,7 +104,8 @@ def read_cloud(path: Path, params: CloudParams | None = None, *, progress: Progr
         shape = (found["shape"][0], found["shape"][1])
         # The files' names are gone with the directory; their pages live on while they are mapped.
         heights, grounds = _mapped(target, shape), _mapped(ground, shape) if found["ground"] else None
-    return _model(path, headers[0], places[0], found, heights, grounds)
+        thinned = _thinned(points, colors, found) if found["shown"] else None
+    return _model(path, headers[0], places[0], found, heights, grounds, thinned)
 
 
 def _order(place: georef.Georeference, params: CloudParams, *, where: str) -> dict[str, Any]:
@@ -115,6 +121,7 @@ def _order(place: georef.Georeference, params: CloudParams, *, where: str) -> di
         "z_m": params.z_scale or place.metres_per_height_unit,
         "max_px": params.limits.max_px,
         "keep_noise": params.keep_noise,
+        "most_points": params.most_points,
     }
 
 
@@ -122,9 +129,15 @@ def _mapped(path: Path, shape: tuple[int, int]) -> F32:
     return np.asarray(np.memmap(path, dtype=np.float32, mode="r+", shape=shape))
 
 
+def _thinned(points: Path, colors: Path, found: dict[str, Any]) -> ThinnedCloud:
+    rgb = np.fromfile(colors, np.uint8).reshape(-1, 3) if found["colored"] else None
+    return ThinnedCloud(np.fromfile(points, np.float64).reshape(-1, 3), rgb, found["voxel_m"])
+
+
 def _model(
-    path: Path, header: CloudHeader, place: georef.Georeference, found: dict[str, Any], heights: F32, ground: F32 | None
-) -> CloudModel:
+    path: Path, header: CloudHeader, place: georef.Georeference, found: dict[str, Any], heights: F32,
+    ground: F32 | None, thinned: ThinnedCloud | None,
+) -> CloudModel:  # fmt: skip
     cell_m = found["cell_m"]
     transform = Affine(cell_m, 0.0, found["west_m"], 0.0, -cell_m, found["north_m"])
     crs = place.horizontal if georef.unit_m(place.horizontal) == 1.0 else georef.in_metres(place.horizontal)
@@ -135,6 +148,7 @@ def _model(
     return CloudModel(
         dsm(heights), None if ground is None else dsm(ground), header.points, found["taken"], found["ground"],
         found["noise"], found["not_numbers"], tuple(found["classes"]), (*header.notes, *place.notes, *_left_out(found)),
+        thinned,
     )  # fmt: skip
 
 

@@ -44,6 +44,19 @@ class TerrainScene:
 
 
 @dataclass(frozen=True, slots=True)
+class PointsScene:
+    """The thinned point cloud of a surface model."""
+
+    terrain_id: str
+    points_m: F64
+    """(N, 3) x, y, alt_dsm"""
+    rgb: U8
+    """(N, 3)"""
+    voxel_m: float
+    """About how far apart neighbours lie."""
+
+
+@dataclass(frozen=True, slots=True)
 class PlanScene:
     """A computed plan as the view draws it; all points are x, y, alt_dsm."""
 
@@ -120,3 +133,5 @@ class SceneState:
     """The recording that is open; then there is no plan."""
     overlay: OverlayScene | None = None
     sites: tuple[SiteMark, ...] = ()
+    points: PointsScene | None = None
+    """Of the surface model on show, once they are wanted and at hand."""

@@ -14,7 +14,7 @@ from skimage import measure
 from mapping.geometry.arrays import F64
 from planning.terrain.dsm import Dsm
 from server.scene.geometry.mesh import drawn_alt_dsm_m, filled
-from server.scene.geometry.payload import HeightGrid, SceneState, TerrainScene
+from server.scene.geometry.payload import HeightGrid, PointsScene, SceneState, TerrainScene
 from server.scene.geometry.scene_frame import LocalFrame
 
 _LARGEST_BODY_M = 0.9
@@ -57,6 +57,17 @@ class Drawing:
     def body_m(self) -> float:
         """Radius of a solid mark where the flight comes near it: it must not hide what flies past."""
         return min(self.mark_m, _LARGEST_BODY_M)
+
+    @property
+    def points(self) -> PointsScene | None:
+        """The cloud's points, while they are drawn."""
+        found = self.state.points if self.state.view.show_points else None
+        return found if found is not None and found.terrain_id == self.terrain.terrain_id else None
+
+    @property
+    def has_mesh(self) -> bool:
+        """Without its points the model itself is drawn whatever the view says."""
+        return self.state.view.show_mesh or self.points is None
 
     def places_xy_m(self, places: Sequence[_Place]) -> F64:
         """(N, 2) projected"""

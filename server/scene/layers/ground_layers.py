@@ -19,6 +19,8 @@ _HATCH_TEXTURE_PX = 1200
 
 
 def terrain_nodes(drawing: Drawing) -> list[Node]:
+    if not drawing.has_mesh:
+        return []
     texture = laid_over(drawing.terrain, drawing.state.overlay)
     glb = textured_glb(grid_mesh(drawing.terrain.grid, drawing.frame), texture)
     return [_glb_node("/terrain", glb, drawing)]

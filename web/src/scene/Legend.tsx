@@ -1,4 +1,4 @@
-import { metres } from "../format";
+import { many, metres, number } from "../format";
 import { trackVersion, tracks } from "../store/flying";
 import { review } from "../store/review";
 import { result, terrain, view } from "../store/state";
@@ -26,6 +26,12 @@ function Key({ kind, label, title }: { kind: string; label: string; title?: stri
   );
 }
 
+/** How many points of the cloud are drawn; null: none. */
+function pointsDrawn(): string | null {
+  const { show_points, points_shown, points_of } = view.value;
+  return show_points && points_shown > 0 ? `${number(points_shown)} of ${many(points_of)} points` : null;
+}
+
 /** What the colours of the 3D view mean, in one line along its lower edge: of what is drawn, nothing else. */
 export function Legend() {
   const { shading, show_surface, show_path, show_unknown } = view.value;
@@ -33,8 +39,12 @@ export function Legend() {
   const planned = result.value !== null && !isReview;
   const flown = !isReview && trackVersion.live.value > 0 && tracks.live.s_m.length > 0;
   const hasUnknown = (terrain.value?.unknown_share ?? 0) > 0;
+  const { show_mesh, points_colored } = view.value;
+  const points = pointsDrawn();
+  const byHeight = points && !show_mesh ? !points_colored : shading === "height";
   const isEmpty =
-    shading !== "height" &&
+    !byHeight &&
+    !points &&
     !(planned && (show_surface || show_path)) &&
     !(show_unknown && hasUnknown) &&
     !flown &&
@@ -42,7 +52,12 @@ export function Legend() {
   if (isEmpty) return null;
   return (
     <div class="legend overlay" data-testid="legend">
-      {shading === "height" && <HeightScale />}
+      {byHeight && <HeightScale />}
+      {points && (
+        <span class="number" data-testid="points-drawn" title="Thinned evenly for drawing">
+          {points}
+        </span>
+      )}
       {planned && show_surface && <Key kind="surface" label="Safe surface" />}
       {planned && show_path && (
         <>

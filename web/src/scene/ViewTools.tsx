@@ -6,21 +6,30 @@ import { hasTraversability } from "../store/traversability";
 import { follows, frame, setView } from "../store/stream";
 import { chase, followed } from "./camera";
 
-type Layer = "show_surface" | "show_path" | "show_unknown" | "show_traversability";
+type Layer =
+  "show_points" | "show_mesh" | "show_surface" | "show_path" | "show_unknown" | "show_traversability";
 
 const LAYERS: readonly { layer: Layer; label: string; title: string }[] = [
+  { layer: "show_points", label: "Points", title: "The point cloud in place of the model made of it" },
+  { layer: "show_mesh", label: "Model", title: "The model beside its points: it hides those below it" },
   { layer: "show_surface", label: "Surface", title: "The safe surface" },
   { layer: "show_path", label: "Path", title: "The path and the mission as it will be flown" },
   { layer: "show_unknown", label: "Unknown", title: "Where the surface model knows no height" },
   { layer: "show_traversability", label: "Ground", title: "Where one can drive and land" },
 ];
 
-/** Traversability has to be worked out first. */
-const isThere = ({ layer }: { layer: Layer }) => layer !== "show_traversability" || hasTraversability.value;
+/** Traversability has to be worked out first, and few models come of a cloud. */
+function isThere({ layer }: { layer: Layer }): boolean {
+  if (layer === "show_traversability") return hasTraversability.value;
+  const { points_shown, show_points } = view.value;
+  if (layer === "show_mesh") return points_shown > 0 && show_points;
+  return layer !== "show_points" || points_shown > 0;
+}
 
 function toggle(layer: Layer): void {
-  const fields: Partial<ViewDoc> = { [layer]: !view.value[layer] };
-  setView(fields);
+  const isOn = !view.value[layer];
+  const fields: Partial<ViewDoc> = { [layer]: isOn };
+  setView(layer === "show_points" ? { ...fields, show_mesh: !isOn } : fields);
 }
 
 /** Layers and camera of the 3D view. */

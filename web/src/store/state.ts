@@ -27,6 +27,8 @@ export const saving = signal(false);
 export const library = signal<LibraryState>({ terrains: [], orthophotos: [], plans: [], profiles: [] });
 export const view = signal<ViewDoc>({
   shading: "height",
+  show_points: false,
+  show_mesh: true,
   show_surface: true,
   show_path: true,
   show_unknown: true,
@@ -43,6 +45,9 @@ export const view = signal<ViewDoc>({
   vertical_exaggeration: 1,
   legend_min_m: null,
   legend_max_m: null,
+  points_shown: 0,
+  points_of: 0,
+  points_colored: false,
 });
 /** The terrain that the 3D view shows; null until the server says so. */
 export const pictured = signal<string | null>(null);
