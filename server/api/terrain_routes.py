@@ -38,7 +38,7 @@ async def add_terrain(
     folder: Annotated[str, Query(max_length=1000)] = "",
     file_utc: Annotated[datetime | None, Query()] = None,
 ) -> Response:
-    """A GeoTIFF, an ESRI ASCII grid, a ZIP of tiles, or a point cloud (LAS, LAZ, COPC, PLY, PCD, E57), told by the
+    """A GeoTIFF, an ESRI ASCII grid, a ZIP of tiles or of a mapping project, or a point cloud, told by the
     content.
 
     What the file does not say can be declared; empty: nothing is. ``cell_m`` and ``keep_noise`` are for clouds.

@@ -20,7 +20,7 @@ from server.heard.flown_track import EVERY_S
 from server.library.documents import request_from_doc
 from server.library.terrain_of import FlownOver
 from server.library.terrains import load_terrain
-from server.plan.file_tasks import named
+from server.plan.archives import named
 from server.scene.geometry.payload import ReviewScene, TerrainScene
 from server.scene.geometry.plain import plain_ground
 from server.schemas import PlanDoc, RecordingDoc, ReviewDoc

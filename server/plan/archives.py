@@ -1,4 +1,4 @@
-"""ZIP archives that pages bring in: limits before anything is read of them, room on the disk before it is written."""
+"""Files that pages bring in, by the operator's names; of ZIP archives limits before anything is read or written."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePosixPath
 
-from planning.errors import DescribedError
+from planning.errors import DescribedError, PlanningError
 from server.errors import BadRequestError, TooLargeError
 from server.library.whole_files import storage_errors
 from server.work.jobs import Progress
@@ -35,6 +35,18 @@ def is_archive(upload: Path) -> bool:
     """Whether an upload is a ZIP archive, by its first bytes."""
     with storage_errors(upload), upload.open("rb") as file:
         return file.read(len(_MAGIC)) == _MAGIC
+
+
+@contextlib.contextmanager
+def named(upload: Path, filename: str, *, kind: type[DescribedError] = PlanningError) -> Iterator[None]:
+    """Errors name the operator's file, not the place where its upload lies."""
+    try:
+        yield
+    except kind as error:
+        for part in ("what", "where", "advice"):
+            text = getattr(error, part).replace(upload.name, filename).replace(upload.stem, filename)
+            setattr(error, part, text)
+        raise
 
 
 @contextlib.contextmanager

@@ -84,6 +84,29 @@ def _cloud_doc(made: CloudModel, dsm: Dsm, *, sized: bool) -> CloudDoc:
     )
 
 
+def cloud_beside_doc(made: CloudModel, points: ThinnedCloud) -> CloudDoc:
+    """Of a cloud that came with a surface model, which tells nothing of that model's cells."""
+    return CloudDoc(
+        made_model=False,
+        points=made.points,
+        taken=made.taken,
+        noise=made.noise,
+        not_numbers=made.not_numbers,
+        points_per_m2=made.taken / (max(1, int(np.isfinite(made.dsm.elevation_m).sum())) * made.dsm.resolution_m**2),
+        cell_chosen=False,
+        shares=[CloudShareDoc(what=what, share=share) for what, share in shares_of(made.classes).items()],
+        canopy_greatest_m=None,
+        canopy_median_m=None,
+        canopy_share=None,
+        small_holes=0,
+        small_holes_m2=0.0,
+        small_hole_limit_m2=SMALL_HOLE_M2,
+        shown=len(points.xyz_m),
+        voxel_m=points.voxel_m,
+        colored=points.rgb is not None,
+    )
+
+
 def _keep_points(folder: Path, thinned: ThinnedCloud | None) -> None:
     if thinned is not None:
         write_points(folder, thinned)

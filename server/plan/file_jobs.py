@@ -59,7 +59,8 @@ class FileJobs:
                     progress=progress,
                 ),
             )
-            await self._desk.propose(lambda document: _use_if_free(document, terrain))
+            photos = [photo.id for photo in self._library.orthophotos() if photo.terrain_id == terrain.id]
+            await self._desk.propose(lambda document: _use_if_free(document, terrain, next(iter(photos), None)))
 
         return self._board.start(f"Reading {filename}", work, clean=lambda: remove_upload(upload))
 
@@ -126,9 +127,12 @@ class FileJobs:
         return made
 
 
-def _use_if_free(document: PlanDoc, terrain: TerrainDoc) -> tuple[str, PlanDoc] | None:
-    free = document.terrain_id is None or not (document.pois or document.survey.polygon)
-    return (f"Use {terrain.name[:40]}", on_terrain(document, terrain.id)) if free else None
+def _use_if_free(document: PlanDoc, terrain: TerrainDoc, photo_id: str | None) -> tuple[str, PlanDoc] | None:
+    """With the orthophoto that came with it, which is there to be chosen and not yet draped."""
+    if document.terrain_id is not None and (document.pois or document.survey.polygon):
+        return None
+    taken = on_terrain(document, terrain.id).model_copy(update={"orthophoto_id": photo_id})
+    return f"Use {terrain.name[:40]}", taken
 
 
 def _swap(document: PlanDoc, terrain_id: str, terrain: TerrainDoc) -> tuple[str, PlanDoc] | None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from planning.errors import DescribedError, FormatError, ParameterError, PlanningError
+from planning.errors import FormatError, ParameterError
 from planning.formats.fence_files import is_fence, read_fence
 from planning.formats.poi_files import looks_swapped, read_pois
 from planning.ground.demo_hillside import demo_dsm, small_hill
@@ -26,6 +26,7 @@ from server.library.terrains import Origin, TerrainManifest, load_terrain, spike
 from server.plan import archives
 from server.plan.cloud_points import copy_points
 from server.plan.cloud_task import import_cloud
+from server.plan.project_task import Unpacked, import_project, project_in, unpacked_project
 from server.plan.tile_archive import unpacked_tiles
 from server.schemas import OrthophotoDoc, PlanDoc, TerrainDoc
 from server.work.jobs import Progress
@@ -33,18 +34,6 @@ from server.work.jobs import Progress
 _HEIGHTS_OF_BEFORE = {"canopy_greatest_m": None, "canopy_median_m": None, "canopy_share": None}
 """Told of a cloud's cells, spikes and all."""
 _STAGES = {"digest": "Reading", "decode": "Reading", "resample": "Resampling", "spikes": "Looking for spikes"}
-
-
-@contextmanager
-def named(upload: Path, filename: str, *, kind: type[DescribedError] = PlanningError) -> Iterator[None]:
-    """Errors name the operator's file, not the place where its upload lies."""
-    try:
-        yield
-    except kind as error:
-        for part in ("what", "where", "advice"):
-            text = getattr(error, part).replace(upload.name, filename).replace(upload.stem, filename)
-            setattr(error, part, text)
-        raise
 
 
 def warm_up(*, report: Progress) -> None:
@@ -68,7 +57,7 @@ def import_terrain(
     report: Progress,
 ) -> TerrainDoc:
     """Reads an uploaded surface model, a file, tiles or a point cloud, into the library. Raises RasterError."""
-    with named(upload, filename), _unpacked(upload, filename, report) as source:
+    with archives.named(upload, filename), _unpacked(upload, filename, report) as source:
         if is_cloud(upload):
             params = CloudParams(cell_m, crs, vertical_datum, z_scale, keep_noise)
             return import_cloud(
@@ -77,6 +66,11 @@ def import_terrain(
         if cell_m is not None or keep_noise:
             what = "Cell size and noise are asked of point clouds: a raster has its own cells."
             raise ParameterError(what, where=filename, advice="Leave both out.")
+        if isinstance(source, Unpacked):
+            params = CloudParams(crs=crs, vertical_datum=vertical_datum, z_scale=z_scale)
+            return import_project(
+                root, filename, source, origin=origin, params=params, without_spikes=remove_spikes, report=report
+            )
         dsm, found = read_dsm_reported(
             source,
             crs=crs,
@@ -91,10 +85,14 @@ def import_terrain(
 
 
 @contextmanager
-def _unpacked(upload: Path, filename: str, report: Progress) -> Iterator[Path]:
-    """What is read of an upload: itself, or a folder of the tiles in it."""
+def _unpacked(upload: Path, filename: str, report: Progress) -> Iterator[Path | Unpacked]:
+    """What is read of an upload: itself, the files of a project in it, or a folder of the tiles in it."""
     if not archives.is_archive(upload):
         yield upload
+        return
+    if (project := project_in(upload, filename)) is not None:
+        with unpacked_project(upload, filename, project, report) as files:
+            yield files
         return
     report("Unpacking", None)
     with unpacked_tiles(upload, filename, report) as folder:
@@ -131,7 +129,7 @@ def import_orthophoto(
 ) -> OrthophotoDoc:
     """Reads an uploaded orthomosaic, brought onto its surface model's grid. Raises RasterError."""
     dsm = load_terrain(terrain_dir)
-    with named(upload, filename):
+    with archives.named(upload, filename):
         photo = read_orthophoto(
             upload,
             bounds_m=dsm.bounds_m,

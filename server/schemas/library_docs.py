@@ -25,8 +25,10 @@ class CloudShareDoc(Strict):
 
 
 class CloudDoc(Strict):
-    """The point cloud that a surface model was made of."""
+    """The point cloud that a surface model was made of, or that came with it."""
 
+    made_model: bool = True
+    """False: it came with the model, and what follows of cells, canopy and holes is not told."""
     points: int
     taken: int
     noise: int

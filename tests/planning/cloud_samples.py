@@ -37,10 +37,11 @@ def write_las(
     withheld: U8 | None = None,
     point_format: int = 6,
     geo_keys: dict[int, int] | None = None,
+    near: F64 = CORNER,
 ) -> Path:
-    """LAS or, by its name, LAZ."""
+    """LAS or, by its name, LAZ; all points within 2000 km of ``near``."""
     header = laspy.LasHeader(point_format=point_format, version="1.4" if point_format >= 6 else "1.2")
-    header.scales, header.offsets = np.full(3, 0.001), CORNER
+    header.scales, header.offsets = np.full(3, 0.001), near
     if crs is not None:
         header.add_crs(CRS.from_user_input(crs))
     if geo_keys is not None:

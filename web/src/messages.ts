@@ -1168,8 +1168,10 @@ export interface CloudShareDoc {
   share: number;
 }
 
-/** The point cloud that a surface model was made of. */
+/** The point cloud that a surface model was made of, or that came with it. */
 export interface CloudDoc {
+  /** False: it came with the model, and what follows of cells, canopy and holes is not told. */
+  made_model: boolean;
   points: number;
   taken: number;
   /** Left out because the file calls them so. */

@@ -1,5 +1,7 @@
 """Which files a surface model is read from: itself, the tiles of a folder, or those that a virtual raster names.
 
+Of a folder that is a mapping program's project it is the project's surface model alone.
+
 Nothing is read because a file says so: what a virtual raster (VRT) names must lie in its folder or below. Where a
 tile lies says the tile.
 """
@@ -11,12 +13,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from planning.errors import RasterFormatError, RasterTooLargeError
+from planning.terrain.projects import Project, project_of
 from planning.terrain.rasters.magic import is_virtual
 from planning.terrain.rasters.mosaic import Claim
 from planning.terrain.rasters.virtual import listed_by
 
 MOST_TILES = 20_000
 _ENDINGS = (".tif", ".tiff")
+_CLOUDS = (".las", ".laz", ".ply", ".e57")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,15 +50,28 @@ def tiles_of(source: Path, *, virtual: bool) -> Tiles | None:
 
 def _in_folder(folder: Path) -> tuple[Path, ...]:
     found: list[Path] = []
+    beside: list[Path] = []
     for here, folders, names in os.walk(folder):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
         found += [Path(here, name) for name in names if _is_tile(name)]
-        _check_count(len(found), folder)
+        beside += [Path(here, name) for name in names if name.lower().endswith(_CLOUDS)]
+        _check_count(max(len(found), len(beside)), folder)
+    project = project_of((path.relative_to(folder).as_posix() for path in (*found, *beside)), where=str(folder))
+    if project is not None:
+        return (folder / _model_of(project, folder),)
     if not found:
         raise RasterFormatError(
             "There is no GeoTIFF (.tif, .tiff) in this folder.", where=str(folder), advice="Give the folder of tiles."
         )
     return tuple(sorted(found))
+
+
+def _model_of(project: Project, folder: Path) -> str:
+    if project.model is None:
+        what = f"This {project.program} project has no surface model."
+        advice = f"Make one of its point cloud first: hedgehop cloud {project.cloud} --out dsm.tif"
+        raise RasterFormatError(what, where=str(folder), advice=advice)
+    return project.model
 
 
 def _is_tile(name: str) -> bool:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from server.errors import BadRequestError
 from server.plan import archives
-from server.plan.file_tasks import named
+from server.plan.archives import named
 from server.work.jobs import Progress
 from telemetry.errors import TelemetryError
 

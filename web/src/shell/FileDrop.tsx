@@ -20,7 +20,7 @@ function Kinds() {
     <>
       <Icon name="import" size={40} />
       <p class="drop-title">Drop to open</p>
-      <p>Surface model: GeoTIFF, ESRI ASCII grid, .zip of tiles</p>
+      <p>Surface model: GeoTIFF, ESRI ASCII grid, .zip of tiles or of a project</p>
       <p>Point cloud: LAS, LAZ, COPC, PLY, PCD, E57</p>
       <p>Points or polygon: CSV, GeoJSON, KML, KMZ, .waypoints, .plan</p>
       <p>Recorded flight: .mcap, .tlog, .bin, .ulg; ROS bag: .bag, .db3, .mcap, .zip</p>

@@ -43,11 +43,15 @@ function CloudFacts({ cloud, cell_m }: { cloud: CloudDoc; cell_m: number }) {
           <dd>{leftOut(cloud)}</dd>
         </>
       )}
-      <dt>Cells</dt>
-      <dd>
-        {metres(cell_m, 2)}, {cloud.cell_chosen ? "as chosen" : "by the density"}; each as high as its highest
-        point
-      </dd>
+      {cloud.made_model && (
+        <>
+          <dt>Cells</dt>
+          <dd>
+            {metres(cell_m, 2)}, {cloud.cell_chosen ? "as chosen" : "by the density"}; each as high as its
+            highest point
+          </dd>
+        </>
+      )}
       {cloud.shares.length > 0 && (
         <>
           <dt>Classes</dt>
@@ -64,13 +68,17 @@ function CloudFacts({ cloud, cell_m }: { cloud: CloudDoc; cell_m: number }) {
           </dd>
         </>
       )}
-      <dt>Small holes</dt>
-      <dd>
-        {cloud.small_holes === 0
-          ? "none"
-          : `${number(cloud.small_holes)}, ${number(cloud.small_holes_m2, 1)} m² in all: plans fill each with its highest neighbour`}
-        ; larger ones than {number(cloud.small_hole_limit_m2)} m² stay unknown
-      </dd>
+      {cloud.made_model && (
+        <>
+          <dt>Small holes</dt>
+          <dd>
+            {cloud.small_holes === 0
+              ? "none"
+              : `${number(cloud.small_holes)}, ${number(cloud.small_holes_m2, 1)} m² in all: plans fill each with its highest neighbour`}
+            ; larger ones than {number(cloud.small_hole_limit_m2)} m² stay unknown
+          </dd>
+        </>
+      )}
     </dl>
   );
 }
@@ -78,6 +86,7 @@ function CloudFacts({ cloud, cell_m }: { cloud: CloudDoc; cell_m: number }) {
 /** What a surface model is, and what is doubtful about it. */
 export function TerrainFacts({ entry }: { entry: TerrainDoc }) {
   const [rereadId, setRereadId] = useState<string | null>(null);
+  const isOfCloud = entry.cloud?.made_model === true;
   const [width_m, height_m] = [entry.width_px * entry.resolution_m, entry.height_px * entry.resolution_m];
   return (
     <>
@@ -115,12 +124,12 @@ export function TerrainFacts({ entry }: { entry: TerrainDoc }) {
       {rereadId === entry.id ? (
         <ReadAgain
           name={entry.name}
-          {...(entry.cloud && !entry.cloud.cell_chosen ? { made_m: entry.resolution_m } : {})}
+          {...(isOfCloud && !entry.cloud?.cell_chosen ? { made_m: entry.resolution_m } : {})}
           onDone={() => setRereadId(null)}
         />
       ) : (
         <Button kind="quiet" icon="import" testid="read-again" onClick={() => setRereadId(entry.id)}>
-          Declare CRS, unit{entry.cloud ? ", cells" : ""} or datum…
+          Declare CRS, unit{isOfCloud ? ", cells" : ""} or datum…
         </Button>
       )}
     </>

@@ -1,0 +1,174 @@
+"""A mapping program's project in a ZIP archive: its surface model opened, its orthophoto and its cloud beside it."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+from secrets import token_hex
+
+from planning.errors import MissingCrsError, PlanningError, RasterFormatError
+from planning.terrain.clouds.read import CloudModel, CloudParams, read_cloud
+from planning.terrain.clouds.thin import ThinnedCloud
+from planning.terrain.dsm import Dsm
+from planning.terrain.geotiff import read_dsm_reported, read_orthophoto
+from planning.terrain.orthophoto import Orthophoto
+from planning.terrain.projects import Project, project_of
+from server.library.orthophotos import store_orthophoto
+from server.library.terrains import Origin, spike_docs, store_terrain
+from server.plan import archives
+from server.plan.beside_model import offset_of, placed_on
+from server.plan.cloud_points import write_points
+from server.plan.cloud_task import MOST_POINTS, cloud_beside_doc
+from server.schemas import CloudDoc, TerrainDoc
+from server.work.jobs import Progress
+
+_MOST_BYTES = 16 * 2**30
+_CELL_M = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Unpacked:
+    """The files of a project; None where it has none."""
+
+    project: Project
+    model: Path
+    orthophoto: Path | None
+    cloud: Path | None
+    offset: Path | None
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """What is laid beside a surface model, and what was said of it."""
+
+    photo: Orthophoto | None = None
+    points: ThinnedCloud | None = None
+    doc: CloudDoc | None = None
+    notes: tuple[str, ...] = ()
+
+
+def project_in(upload: Path, filename: str) -> Project | None:
+    """None for an archive of tiles. Raises RasterFormatError, BadRequestError, TooLargeError."""
+    with archives.opened(upload, filename) as archive:
+        names = [member.filename for member in archive.infolist() if not member.is_dir()]
+    return project_of(names, where=filename)
+
+
+@contextmanager
+def unpacked_project(upload: Path, filename: str, project: Project, report: Progress) -> Iterator[Unpacked]:
+    """As long as it is read, under names of our own. Raises RasterFormatError where it has no surface model."""
+    if project.model is None:
+        what = f"This {project.program} project has no surface model."
+        advice = f"Export it with one (DSM), or open its point cloud alone ({project.cloud}): a model is made of it."
+        raise RasterFormatError(what, where=filename, advice=advice)
+    report("Unpacking", None)
+    wanted = (project.model, project.orthophoto, project.cloud, project.offset)
+    own = {name: f"{token_hex(8)}{PurePosixPath(name).suffix.lower()}" for name in wanted if name is not None}
+    with tempfile.TemporaryDirectory(dir=upload.parent, prefix=f"{upload.stem}-") as directory:
+        folder = Path(directory, "project")
+        with archives.opened(upload, filename) as archive:
+            members = {own[name]: archive.getinfo(name) for name in own}
+            archives.unpack(archive, members, folder, filename, most_bytes=_MOST_BYTES, report=report)
+        model, *others = (None if name is None else folder / own[name] for name in wanted)
+        assert model is not None
+        yield Unpacked(project, model, *others)
+
+
+def import_project(
+    root: Path, filename: str, found: Unpacked, *, origin: Origin, params: CloudParams, without_spikes: bool,
+    report: Progress,
+) -> TerrainDoc:  # fmt: skip
+    """What cannot be laid beside the surface model is left out and said; the model itself raises RasterError."""
+    with archives.named(found.model, f"{filename}, {found.project.model}"):
+        dsm, said = read_dsm_reported(
+            found.model,
+            crs=params.crs,
+            z_scale=params.z_scale,
+            vertical_datum=params.vertical_datum,
+            remove_spikes=without_spikes,
+            progress=lambda stage, share: report("Reading the surface model", share),
+        )
+    photo, cloud = _photo(found, dsm, report), _cloud(found, dsm, params, report)
+    report("Storing", None)
+    left = () if said.spikes_removed else said.spikes
+    doc = store_terrain(
+        root,
+        dsm,
+        name=filename,
+        origin=origin,
+        spikes=spike_docs(left),
+        warnings=[*said.warnings, *photo.notes, *cloud.notes, *_left_out(found.project)],
+        cloud=cloud.doc,
+        fill=lambda folder: None if cloud.points is None else write_points(folder, cloud.points),
+    )
+    if photo.photo is not None:
+        name = PurePosixPath(found.project.orthophoto or "").name
+        store_orthophoto(root, photo.photo, name=name, terrain_id=doc.id)
+    return doc
+
+
+def _left_out(project: Project) -> list[str]:
+    if not project.more:
+        return []
+    return [f"Of this {project.program} project more was left out: {', '.join(project.more)[:300]}."]
+
+
+def _photo(found: Unpacked, dsm: Dsm, report: Progress) -> Beside:
+    """In another system it is brought into the model's; in none that it names, it is taken to be in that."""
+    name, path = found.project.orthophoto, found.orthophoto
+    if name is None or path is None:
+        return Beside()
+
+    def read(declared_crs: str | None) -> Orthophoto:
+        return read_orthophoto(
+            path,
+            bounds_m=dsm.bounds_m,
+            crs=dsm.crs,
+            declared_crs=declared_crs,
+            progress=lambda stage, share: report("Reading the orthophoto", share),
+        )
+
+    report("Reading the orthophoto", 0.0)
+    try:
+        with archives.named(path, name):
+            try:
+                return Beside(photo=read(None))
+            except MissingCrsError:
+                note = f"{name} names no reference system: it was taken to be in the model's ({dsm.crs.name})."
+                return Beside(photo=read(dsm.crs.to_wkt()), notes=(note,))
+    except PlanningError as error:
+        return Beside(notes=(f"The orthophoto is left out. {error}",))
+
+
+def _cloud(found: Unpacked, dsm: Dsm, params: CloudParams, report: Progress) -> Beside:
+    name, path = found.project.cloud, found.cloud
+    if name is None or path is None:
+        return Beside()
+    report("Reading the point cloud", 0.0)
+    # Its cells are of no use here: large ones, so that no cloud is too large for them.
+    how = CloudParams(max(_CELL_M, dsm.resolution_m), keep_noise=params.keep_noise, most_points=MOST_POINTS)
+    try:
+        with archives.named(path, name):
+            made, says_where = _read(path, how, dsm, report)
+            offset_m = None if found.offset is None else offset_of(found.offset)
+    except PlanningError as error:
+        return Beside(notes=(f"The point cloud is left out. {error}",))
+    assert made.thinned is not None
+    crs = made.dsm.crs if says_where else None
+    points, notes = placed_on(dsm, made.thinned, crs, name=name, offset_m=offset_m)
+    return Beside(points=points, doc=None if points is None else cloud_beside_doc(made, points), notes=tuple(notes))
+
+
+def _read(path: Path, how: CloudParams, dsm: Dsm, report: Progress) -> tuple[CloudModel, bool]:
+    """The cloud, and whether it names its reference system; one that does not is read in the model's."""
+
+    def read(how: CloudParams) -> CloudModel:
+        return read_cloud(path, how, progress=lambda stage, share: report("Reading the point cloud", share))
+
+    try:
+        return read(how), True
+    except MissingCrsError:
+        return read(replace(how, crs=dsm.crs.to_wkt())), False
