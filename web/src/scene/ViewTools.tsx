@@ -21,10 +21,11 @@ const LAYERS: readonly { layer: Layer; label: string; title: string }[] = [
 /** Traversability has to be worked out first, and few models come of a cloud. */
 function isThere({ layer }: { layer: Layer }): boolean {
   if (layer === "show_traversability") return hasTraversability.value;
-  const { points_shown, show_points } = view.value;
-  if (layer === "show_mesh") return points_shown > 0 && show_points;
-  return layer !== "show_points" || points_shown > 0;
+  return (layer !== "show_points" && layer !== "show_mesh") || view.value.points_shown > 0;
 }
+
+/** Without its points the model itself is always drawn. */
+const isBound = (layer: Layer) => layer === "show_mesh" && !view.value.show_points;
 
 function toggle(layer: Layer): void {
   const isOn = !view.value[layer];
@@ -43,7 +44,8 @@ export function ViewTools() {
               type="button"
               key={layer}
               title={title}
-              aria-pressed={view.value[layer]}
+              aria-pressed={view.value[layer] || isBound(layer)}
+              disabled={isBound(layer)}
               data-testid={`layer-${layer.slice("show_".length)}`}
               onClick={() => toggle(layer)}
             >
