@@ -60,7 +60,7 @@ class FileJobs:
                 ),
             )
             photos = [photo.id for photo in self._library.orthophotos() if photo.terrain_id == terrain.id]
-            await self._desk.propose(lambda document: _use_if_free(document, terrain, next(iter(photos), None)))
+            await self._desk.propose(lambda document: use_if_free(document, terrain, next(iter(photos), None)))
 
         return self._board.start(f"Reading {filename}", work, clean=lambda: remove_upload(upload))
 
@@ -127,7 +127,7 @@ class FileJobs:
         return made
 
 
-def _use_if_free(document: PlanDoc, terrain: TerrainDoc, photo_id: str | None) -> tuple[str, PlanDoc] | None:
+def use_if_free(document: PlanDoc, terrain: TerrainDoc, photo_id: str | None) -> tuple[str, PlanDoc] | None:
     """With the orthophoto that came with it, which is there to be chosen and not yet draped."""
     if document.terrain_id is not None and (document.pois or document.survey.polygon):
         return None

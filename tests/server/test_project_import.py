@@ -15,8 +15,9 @@ from mapping.geometry.arrays import F64
 from planning.errors import MissingCrsError, ParameterError, RasterFormatError
 from server.library import Library
 from server.plan.cloud_points import read_points
+from server.plan.file_jobs import use_if_free
 from server.plan.file_tasks import import_terrain
-from server.schemas import TerrainDoc
+from server.schemas import PlanDoc, PoiDoc, TerrainDoc
 from tests.planning.cloud_samples import write_las
 from tests.planning.geotiff_samples import hill, write_raster
 from tests.server.test_cloud_import import NOTHING_SAID
@@ -166,3 +167,15 @@ def test_what_is_wrong_names_the_projects_file(library: Library, tmp_path: Path)
     photo, cloud = doc.warnings
     assert photo.startswith("The orthophoto is left out. odm_orthophoto/odm_orthophoto.tif:")
     assert cloud.startswith("The point cloud is left out. odm_georeferencing/odm_georeferenced_model.laz:")
+
+
+def test_a_plan_without_points_takes_the_model_with_its_photo_and_another_is_left_alone(
+    library: Library, tmp_path: Path
+) -> None:
+    doc = imported(library, project(tmp_path / "a", without="cloud"))
+    (photo,) = library.orthophotos()
+    taken = use_if_free(PlanDoc(), doc, photo.id)
+    assert taken is not None
+    assert (taken[1].terrain_id, taken[1].orthophoto_id) == (doc.id, photo.id)
+    busy = PlanDoc(terrain_id="other", pois=[PoiDoc(id="p1", lat_deg=37.0, lon_deg=15.0, name="P1")])
+    assert use_if_free(busy, doc, photo.id) is None

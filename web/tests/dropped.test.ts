@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { droppedFiles, folderOf } from "../src/store/dropped";
+import { droppedFiles, folderOf, partsOfProject } from "../src/store/dropped";
 
 const file = (name: string) => new File(["x"], name);
 
@@ -50,5 +50,24 @@ describe("dropped files", () => {
       ["survey/west", "dsm.tif"],
       ["survey", "points.csv"],
     ]);
+  });
+
+  it("of a folder that is a project are known as its parts, and those beside it are not", async () => {
+    const odm = (name: string) => {
+      const inner = folderEntry("odm_dem", `/${name}/odm_dem`, [
+        fileEntry("dsm.tif", `/${name}/odm_dem/dsm.tif`),
+      ]);
+      return folderEntry(name, `/${name}`, [inner, fileEntry("notes.csv", `/${name}/notes.csv`)]);
+    };
+    const points = file("points.csv");
+    const found = await droppedFiles(drop([odm("all"), { isDirectory: false }], [file("all"), points]));
+    expect(found).toContain(points);
+    expect(partsOfProject(found).map((f) => f.name)).toEqual(["dsm.tif", "notes.csv"]);
+  });
+
+  it("that lie in a folder of tiles, or alone, are no project", async () => {
+    const tiles = folderEntry("odm", "/odm", [fileEntry("dsm.tif", "/odm/dsm.tif")]);
+    const found = await droppedFiles(drop([tiles], [file("odm")]));
+    expect(partsOfProject([...found, file("x_densified_point_cloud.las")])).toEqual([]);
   });
 });

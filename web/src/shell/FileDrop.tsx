@@ -1,8 +1,9 @@
 import { useEffect } from "preact/hooks";
 import { Icon } from "../ui/Icon";
 import { takeRecordings } from "../review/ReviewLeft";
-import { droppedFiles } from "../store/dropped";
+import { droppedFiles, partsOfProject } from "../store/dropped";
 import { isObserver, whyObserver } from "../store/flying";
+import { notifyText } from "../store/state";
 import { isRadarLog, recordingsAmong, takeFiles } from "../store/files";
 import { dragging, goTo, study, viewId } from "../store/view";
 import { bringIn, isRadarSamples } from "../studies/radar";
@@ -62,7 +63,11 @@ export function FileDrop() {
     event.preventDefault();
     end();
     if (!event.dataTransfer || isObserver.value) return;
-    const dropped = await droppedFiles(event.dataTransfer);
+    const all = await droppedFiles(event.dataTransfer);
+    const parts = partsOfProject(all);
+    if (parts.length > 0)
+      notifyText("error", "The folder is a mapping project: nothing of it was opened.", "Drop it as a ZIP.");
+    const dropped = all.filter((file) => !parts.includes(file));
     const recordings = await recordingsAmong(dropped);
     takeRecordings([...recordings]);
     const files = dropped.filter((file) => !recordings.has(file));

@@ -7,6 +7,15 @@ const OPENED =
 
 export const folderOf = (file: File): string => folders.get(file) ?? "";
 
+const OF_PROJECT =
+  /\/(odm_dem\/dsm|odm_orthophoto\/odm_orthophoto)\.tif$|_densified_point_cloud[^/]*\.la[sz]$/i;
+
+/** Files of a dropped folder that is a mapping program's project: apart they would become models that are none. */
+export const partsOfProject = (files: readonly File[]): File[] =>
+  files.some((file) => folderOf(file) && OF_PROJECT.test(`/${folderOf(file)}/${file.name}`))
+    ? files.filter((file) => folderOf(file))
+    : [];
+
 /** All files dropped; of folders those that can be opened, whichever folder they lie in. */
 export async function droppedFiles(data: DataTransfer): Promise<File[]> {
   // Entries must be taken before the first wait: then the list is emptied.
