@@ -111,12 +111,14 @@ def _with_shades(file: Any, buffers: Any, count: int) -> F32:
 
 def _rgb(header: Any, shades: F32) -> U16:
     """(3, N) between the limits that the scan gives, or bytes -> (N, 3) of 8 bits."""
-    limits: Any = header.node["colorLimits"] if header.node.isDefined("colorLimits") else None
+    node: Any = header.node
+    limits = node["colorLimits"] if node.isDefined("colorLimits") else None
     out = np.zeros((shades.shape[1], 3), np.uint16)
     for at, (name, shade) in enumerate(zip(_COLORS, shades, strict=True)):
         ends = (f"{name}Minimum", f"{name}Maximum")
-        given = limits is not None and all(limits.isDefined(end) for end in ends)
-        low, high = (float(limits[end].value()) for end in ends) if given else (0.0, 255.0)
+        low, high = 0.0, 255.0
+        if limits is not None and all(limits.isDefined(end) for end in ends):
+            low, high = (float(limits[end].value()) for end in ends)
         share = (shade - low) / (high - low) if high > low else np.zeros_like(shade)
         out[:, at] = np.round(np.clip(np.nan_to_num(share), 0.0, 1.0) * 255)
     return out
