@@ -79,9 +79,20 @@ def test_publisher_and_subscriber_may_come_in_any_order(folder: Path, names: tup
     run(whole)
 
 
+async def acquainted(one: Bus, other: Bus) -> None:
+    """Until each knows what the other hears: before that, all is sent to who has just joined."""
+    meetings = (one, other, Topic.PLAN, plan(1)), (other, one, Topic.SERVER, ServerAlive(0.0, 1))
+    for here, there, topic, message in meetings:
+        heard = there.subscribe(topic)
+        here.publish(topic, message)
+        assert await anext(heard) == (topic, message)
+        heard.close()
+
+
 def test_a_late_subscriber_gets_the_last_value_once_and_no_old_events(folder: Path) -> None:
     async def whole() -> None:
         async with await Bus.open(folder, "link") as link, await Bus.open(folder, "recorder") as recorder:
+            await acquainted(link, recorder)
             link.publish(Topic.VEHICLE, state(1))
             link.publish(Topic.TEXT, text(1))
             link.publish(Topic.VEHICLE, state(2))

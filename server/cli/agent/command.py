@@ -86,7 +86,8 @@ async def _run(made: Agent, source: Source) -> None:
                 await asyncio.sleep(0.02)
     except TimeoutError:
         say(f"The ground station does not answer ({made.counts.trouble or 'no answer'}): it is tried again.")
-    threading.Thread(target=_read, args=(source.readings, made.put, loop, ended), daemon=True).start()
+    reader = threading.Thread(target=_read, args=(source.readings, made.put, loop, ended), daemon=True)
+    reader.start()
     teller = asyncio.ensure_future(_tell(made, source))
     try:
         await asyncio.wait((ended, connection), return_when=asyncio.FIRST_COMPLETED)
@@ -98,6 +99,8 @@ async def _run(made: Agent, source: Source) -> None:
             task.cancel()
         if source.close is not None:
             await asyncio.to_thread(source.close)
+            # It closes too: a thread that the end of Python meets inside a library takes the process with it.
+            await asyncio.to_thread(reader.join, LAST_FRAMES_S)
         with contextlib.suppress(asyncio.CancelledError):
             await connection
 
