@@ -40,9 +40,8 @@ from server.library.terrains import load_terrain
 from server.plan.cloud_points import read_points
 from server.plan.profile_chart import chart
 from server.scene.geometry.payload import PlanScene, PointsScene, TerrainScene
-from server.scene.geometry.points_payload import build_points_scene
 from server.scene.geometry.relief import kept_within, relief
-from server.scene.geometry.terrain_payload import Shading, build_terrain_scene
+from server.scene.geometry.terrain_payload import Shading, build_points_scene, build_terrain_scene
 from server.scene.mirror import Voxels
 from server.schemas import (
     BetterHomeDoc,

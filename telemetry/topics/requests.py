@@ -1,7 +1,7 @@
 """What may be asked of the link and of perception, and by whom. All are frozen dataclasses.
 
 The link node refuses every request that changes anything on a vehicle when its operator's token is lower than the
-highest one it has seen.
+highest one it has seen. What it answers stands behind the arrow; errors come back as DescribedError.
 """
 
 from __future__ import annotations
@@ -17,8 +17,6 @@ from telemetry.topics.obstacles import AvoidBy
 from telemetry.topics.onboard_lists import Item, PlaceList
 from telemetry.topics.parameters import ParameterChange
 from telemetry.topics.vehicle import HomePlace
-
-# To the link node. What it answers stands behind the arrow; errors come back as DescribedError.
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,8 +93,7 @@ class UploadPlaces(OperatorRequest):
 class TakeUp(OperatorRequest):
     """Makes the mission on board, if its digest is this, the one that ``Resume`` flies, from its first item. -> None
 
-    Refused unless the vehicle holds still where that mission was certified to begin; so is ``Resume`` then. ``home`` as
-    for ``FlyWay``.
+    Refused unless the vehicle holds where the mission was certified to begin, as is ``Resume``; ``home``: a way's.
     """
 
     digest: str

@@ -12,11 +12,10 @@ import numpy as np
 from planning.terrain.clouds.thin import ThinnedCloud
 from server.plan.picture import Picture
 from server.scene.geometry.payload import PointsScene, SceneState
-from server.scene.geometry.points_payload import build_points_scene
 from server.scene.geometry.stage import Drawing
-from server.scene.layers.ground_layers import terrain_nodes
+from server.scene.geometry.terrain_payload import build_points_scene
+from server.scene.layers.ground_layers import points_nodes, terrain_nodes
 from server.scene.layers.layers import layers, unchanged
-from server.scene.layers.points_layer import points_nodes
 from server.schemas import CloudDoc, PlanDoc, SelectionDoc, ViewDoc
 from tests.server.fakes import Told
 from tests.server.scene_fixtures import exaggerated, hill, state_over

@@ -1,4 +1,4 @@
-"""A surface model as the arrays that the 3D view draws."""
+"""A surface model, and the points it was made of, as the arrays that the 3D view draws."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ from typing import Literal
 
 import numpy as np
 
-from mapping.geometry.arrays import U8
+from mapping.geometry.arrays import F64, U8
 from planning.safe_surface.surface import block_max
+from planning.terrain.clouds.thin import ThinnedCloud
 from planning.terrain.dsm import Dsm
-from planning.terrain.hillshade import height_colors, hillshade
+from planning.terrain.hillshade import height_colors, hillshade, scale_rgb
 from planning.terrain.orthophoto import Orthophoto
-from server.scene.geometry.payload import HeightGrid, TerrainScene
+from server.scene.geometry.payload import HeightGrid, PointsScene, TerrainScene
 
 Shading = Literal["height", "hillshade", "orthophoto"]
 Progress = Callable[[str, float | None], None]
@@ -26,6 +27,9 @@ _DARKEST = 0.45
 _FLAT_LIGHT = 0.7071
 """What the sun of `planning.terrain.hillshade` gives flat ground."""
 _NO_PHOTO_RGB = (176, 176, 180)
+_SHADES = 256
+_DARKEST_POINT, _DARKEST_BELOW_M = 0.45, 10.0
+"""What is left of a colour so far below the top of its cell: trunks stand out from crowns, and ground from both."""
 
 
 def build_terrain_scene(
@@ -95,3 +99,21 @@ def _over_extent(texture: U8, fine: Dsm, grid: Dsm) -> U8:
     rows = max(round(grid.height_px * grid.resolution_m / fine.resolution_m), texture.shape[0])
     cols = max(round(grid.width_px * grid.resolution_m / fine.resolution_m), texture.shape[1])
     return np.pad(texture, ((0, rows - texture.shape[0]), (0, cols - texture.shape[1]), (0, 0)), mode="edge")
+
+
+def build_points_scene(terrain_id: str, dsm: Dsm, cloud: ThinnedCloud, *, low_m: float, high_m: float) -> PointsScene:
+    """A thinned cloud in its own colours, else by height.
+
+    ``low_m`` and ``high_m``: the heights that the ends of the colour scale mean, as on the model beside it.
+    """
+    rgb = cloud.rgb if cloud.rgb is not None else _by_height(dsm, cloud.xyz_m, low_m, high_m)
+    return PointsScene(terrain_id, np.asarray(cloud.xyz_m), np.asarray(rgb), cloud.voxel_m)
+
+
+def _by_height(dsm: Dsm, xyz_m: F64, low_m: float, high_m: float) -> U8:
+    """(N, 3) the scale's colour of each height, the darker the farther it is below the model there."""
+    share = np.clip((xyz_m[:, 2] - low_m) / max(high_m - low_m, 1e-6), 0.0, 1.0)
+    colors = scale_rgb(_SHADES)[np.round(share * (_SHADES - 1)).astype(np.intp)]
+    below_m = np.nan_to_num(dsm.elevation_at(xyz_m[:, :2]) - xyz_m[:, 2])
+    light = 1.0 - (1.0 - _DARKEST_POINT) * np.clip(below_m / _DARKEST_BELOW_M, 0.0, 1.0)
+    return np.round(colors * light[:, None]).astype(np.uint8)

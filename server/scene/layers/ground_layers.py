@@ -1,4 +1,4 @@
-"""Layers of the ground: the terrain with its texture, unknown terrain, the safe surface."""
+"""Layers of the ground: the terrain with its texture or its points, unknown terrain, the safe surface."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ _SURFACE_OPACITY = 0.26
 SURFACE_BELOW_M = 0.04
 _HATCH_PX = 14
 _HATCH_TEXTURE_PX = 1200
+_POINT_SHARE, _LEAST_POINT_M = 1.1, 0.03
+"""Of a voxel's edge: points of level ground nearly close up, those of a mast stand apart."""
 
 
 def terrain_nodes(drawing: Drawing) -> list[Node]:
@@ -24,6 +26,26 @@ def terrain_nodes(drawing: Drawing) -> list[Node]:
     texture = laid_over(drawing.terrain, drawing.state.overlay)
     glb = textured_glb(grid_mesh(drawing.terrain.grid, drawing.frame), texture)
     return [_glb_node("/terrain", glb, drawing)]
+
+
+def points_nodes(drawing: Drawing) -> list[Node]:
+    """The cloud that the surface model was made of, in the model's place."""
+    points = drawing.points
+    if points is None:
+        return []
+    frame = drawing.frame
+    # Stretched by the browser: another exaggeration sends no point again.
+    origin_m = np.array([frame.centre_x_m, frame.centre_y_m, frame.reference_alt_dsm_m])
+    props = {
+        "points": (points.points_m - origin_m).astype(np.float32),
+        "colors": points.rgb,
+        "point_size": max(_LEAST_POINT_M, _POINT_SHARE * points.voxel_m),
+        "point_shape": "circle",
+        "point_shading": "flat",
+        "precision": "float32",
+        "scale": (1.0, 1.0, frame.exaggeration),
+    }
+    return [Node("/points", "point_cloud", props)]
 
 
 def unknown_nodes(drawing: Drawing) -> list[Node]:

@@ -11,9 +11,8 @@ from server.scene.geometry.payload import OverlayScene, PlanScene, PointsScene, 
 from server.scene.geometry.stage import Drawing
 from server.scene.layers.fence_layer import fence_nodes
 from server.scene.layers.flight_layers import flight_nodes, review_nodes
-from server.scene.layers.ground_layers import surface_nodes, terrain_nodes, unknown_nodes
+from server.scene.layers.ground_layers import points_nodes, surface_nodes, terrain_nodes, unknown_nodes
 from server.scene.layers.mark_layers import is_first_home, place_nodes, poi_nodes
-from server.scene.layers.points_layer import points_nodes
 from server.scene.layers.site_layer import site_nodes
 
 _POIS, _FENCE = "pois", "fence"
