@@ -1,7 +1,7 @@
 """Time of a test's own: where everybody waits, the clock goes on to what is due next.
 
 For coroutines that do all they test in one process, over real sockets. What a busy machine does not get done in time
-is in time here: computing takes none.
+is in time here: computing takes next to none. Threads that a test starts itself are not seen.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import contextlib
 import selectors
 import time
 from collections.abc import Awaitable, Callable, Iterator
-from concurrent.futures import Executor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from typing import Any, TypeVar
 from unittest import mock
 
@@ -19,6 +19,10 @@ from tests.telemetry.bus_runs import bounded
 
 REST_EVERY_S, REST_S = 0.025, 0.001
 """After so much time of its own, so much real time for what the kernel still carries from socket to socket."""
+TURN_S = 1e-5
+"""Of each turn of the loop: who answer each other for ever use up the test's time."""
+HELD_UP_S = 0.5
+"""A turn that takes longer counts as long as it takes: a busy machine makes none, a product that blocks does."""
 T = TypeVar("T")
 
 
@@ -32,6 +36,7 @@ class _Clock:
     def __init__(self) -> None:
         self.now_s, self._real_s = time.monotonic(), time.monotonic
         self._utc_ahead_ns = time.time_ns() - round(self.now_s * 1e9)
+        self._turned_s = self.now_s
 
     @contextlib.contextmanager
     def told(self) -> Iterator[None]:
@@ -50,6 +55,14 @@ class _Clock:
     def _utc_ns(self) -> int:
         return round(self.now_s * 1e9) + self._utc_ahead_ns
 
+    def turn(self) -> None:
+        """The loop has done what was due. What holds it up for long takes its time: nobody else is served meanwhile."""
+        held_s = self._real_s() - self._turned_s
+        self.now_s += held_s if held_s > HELD_UP_S else TURN_S
+
+    def turned(self) -> None:
+        self._turned_s = self._real_s()
+
     @contextlib.contextmanager
     def as_real(self) -> Iterator[None]:
         """It goes on by the time that the block really takes."""
@@ -62,15 +75,21 @@ class _Loop(asyncio.SelectorEventLoop):
     def __init__(self, clock: _Clock) -> None:
         self._selecting = _Selector(clock)
         super().__init__(self._selecting)
+        self._threads = ThreadPoolExecutor()
+        self.set_default_executor(self._threads)
 
     def run_in_executor(self, executor: Executor | None, func: Callable[..., T], *args: Any) -> asyncio.Future[T]:
-        done = super().run_in_executor(executor, func, *args)
-        self._selecting.threads += 1
+        """Counted until it is done, also where nobody waits for it any more."""
+        done = (executor or self._threads).submit(func, *args)
+        self._selecting.working.add(done)
         done.add_done_callback(self._has_ended)
-        return done
+        return asyncio.wrap_future(done, loop=self)
 
-    def _has_ended(self, _: asyncio.Future[Any]) -> None:
-        self._selecting.threads -= 1
+    def _has_ended(self, done: Future[Any]) -> None:
+        """In its thread."""
+        self._selecting.working.discard(done)
+        with contextlib.suppress(RuntimeError):  # the loop has ended before
+            self.call_soon_threadsafe(lambda: None)
 
 
 class _Selector(selectors.DefaultSelector):
@@ -78,17 +97,25 @@ class _Selector(selectors.DefaultSelector):
 
     def __init__(self, clock: _Clock) -> None:
         super().__init__()
-        self._clock, self._rested_s, self.threads = clock, clock.now_s, 0
+        self._clock, self._rested_s = clock, clock.now_s
+        self.working = set[Future[Any]]()
 
     def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-        if timeout is None or self.threads:  # a thread's work takes as long as it takes
+        self._clock.turn()
+        try:
+            return self._select(timeout)
+        finally:
+            self._clock.turned()
+
+    def _select(self, timeout: float | None) -> list[tuple[selectors.SelectorKey, int]]:
+        if timeout is None or self.working:  # a thread's work takes as long as it takes
             with self._clock.as_real():
                 return super().select(timeout)
-        if (ready := super().select(0)) or timeout <= 0:
-            return ready
-        if self._clock.now_s + timeout - self._rested_s > REST_EVERY_S:
-            self._rested_s = self._clock.now_s + timeout
-            if ready := super().select(REST_S):
-                return ready
-        self._clock.now_s += timeout
-        return []
+        until_s = self._clock.now_s + timeout
+        ready = super().select(0)
+        while not ready and self._clock.now_s < until_s:
+            self._clock.now_s = min(until_s, self._rested_s + REST_EVERY_S)
+            if self._clock.now_s >= self._rested_s + REST_EVERY_S:
+                self._rested_s = self._clock.now_s
+                ready = super().select(REST_S)
+        return ready
