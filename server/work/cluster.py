@@ -14,7 +14,7 @@ import os
 import socket
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -143,7 +143,8 @@ def _client(where: str) -> Iterator[Any]:
         client.__init__(where, timeout=_JOIN_S, set_as_default=False)
     except Exception as error:  # it gives up in any way: no answer, no key, an attempt that it cancelled itself
         # Collected as garbage it would close in any thread, and in that of a loop which starts wait for ever.
-        client.close()
+        with suppress(Exception):  # where it failed before it had anything to close
+            client.close()
         raise ClusterError(
             f"No Dask scheduler is reached ({type(error).__name__}: {error}).",
             where=where,

@@ -137,6 +137,14 @@ def test_a_scheduler_that_is_not_there_or_has_no_worker_is_said(monkeypatch: pyt
         list(spread(_worked_out, [0], empty, lambda share: None))
 
 
+def test_a_key_that_is_not_there_is_said(tmp_path: Path) -> None:
+    with (
+        dask.config.set({"distributed.comm.tls.ca-file": str(tmp_path / "none.pem")}),
+        pytest.raises(ClusterError, match=r"No Dask scheduler is reached .*distributed\.comm\.tls"),
+    ):
+        list(spread(_worked_out, [0], "tls://127.0.0.1:1", lambda share: None))
+
+
 def test_a_worker_of_another_version_is_refused_also_if_it_joins_later(
     scheduler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
