@@ -149,6 +149,46 @@ def test_resume_after_a_restart_reads_what_is_on_board_and_flies_only_what_was_s
     run(whole)
 
 
+@pytest.mark.parametrize("meanwhile", ["written anew by somebody", "flown past an obstacle"])
+def test_what_changes_while_the_mission_is_read_is_not_flown_on(
+    meanwhile: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def whole() -> None:
+        async with desk(heartbeat(custom_mode=BRAKE, base_mode=ARMED), in_air(), POSITION) as it:
+            it.flight.take_up(FLYING)
+            it.pilot.inherit(Started("old"))
+            it.on_board = OnboardMission(MISSION, None, None, None, "old")
+            it.pilot.on_tick()
+            onboard, ends = it.bench.vehicle.onboard, it.bench.vehicle.onboard.transfer_ends
+
+            def and_then(mission: OnboardMission, now_s: float) -> None:
+                ends(mission, now_s)
+                if meanwhile == "written anew by somebody":
+                    onboard.on_foreign(mavlink.MAVLink_mission_clear_all_message(1, 1), 1)
+                else:
+                    monkeypatch.setattr(type(it.pilot), "is_guided", True)
+
+            monkeypatch.setattr(onboard, "transfer_ends", and_then)
+            with pytest.raises((MissionUnknownError, NotAllowedError), match=r"not known any more|Another"):
+                await it.pilot.resume()
+            assert it.modes() == []
+
+    run(whole)
+
+
+def test_a_vehicle_that_was_not_heard_since_a_restart_is_not_told_to_start_its_mission() -> None:
+    async def whole() -> None:
+        async with desk() as it:
+            it.flight.take_up(replace(FLYING, phase="paused"))
+            it.pilot.inherit(Started("old"))
+            it.pilot.on_tick()
+            assert it.pilot.status.not_resumed == "The vehicle has not been heard yet."
+            it.bench.hear(heartbeat(custom_mode=BRAKE, base_mode=ARMED), in_air(), POSITION)
+            assert it.pilot.status.not_resumed == ""
+
+    run(whole)
+
+
 def test_the_end_of_the_flight_ends_it() -> None:
     async def whole() -> None:
         async with desk(heartbeat(custom_mode=BRAKE, base_mode=ARMED), in_air()) as it:

@@ -231,6 +231,8 @@ class Pilot:
         status = self.flight.status
         if status.phase != "paused":
             return status
+        if self.vehicle.state.heartbeat_t_mono_s is None:
+            return replace(status, not_resumed="The vehicle has not been heard yet.")
         try:
             self._check_resumes()
         except TelemetryError as error:
@@ -264,7 +266,9 @@ class Pilot:
             return
         if self._under_way.must_be_read:
             await self._read_mission()
-            self._check_resumes()
+            if self.is_guided or not self.flight.is_under_way:
+                raise NotAllowedError(SUPERSEDED, advice="Look at what is flown now.")
+        self._under_way.check_goes_on(self.vehicle.state)
         if self._under_way.started.begins is None:
             await check_not_begun_anew(self.vehicle.firmware, self._read_parameters)
         await self._procedures.take_over(self._mission_mode)
