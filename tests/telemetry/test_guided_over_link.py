@@ -53,6 +53,9 @@ async def simulated(
 ) -> AsyncIterator[tuple[Console, Simulator, Proxy]]:
     """``led``: along the legs, by the clock on the wall; else it flies straight legs by itself, in its own time."""
     port, settings = free_port(), QUICKLY_DOWN if led else (*QUICKLY_DOWN, ("GUID_OPTIONS", 64.0))
+    if loss:
+        # Take-off is ordered anew each 6 s where the order is lost: twice, and a vehicle has its motors off again.
+        settings = (*settings, ("DISARM_DELAY", 0.0))
     options: Any = {"link": f"udpin:127.0.0.1:{port}", "speedup": speedup, "boot_s": 0.5, "parameters": settings}
     async with (
         flying(SimOptions(LAT_DEG, LON_DEG, 800.0, **options)) as simulator,
