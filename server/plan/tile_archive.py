@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
 from planning.errors import RasterFormatError, RasterTooLargeError
+from planning.terrain.projects import check_surfaces
 from planning.terrain.rasters.tiles import MOST_TILES
 from server.plan import archives
 from server.work.jobs import Progress
@@ -44,6 +45,7 @@ def _tiles(archive: zipfile.ZipFile, filename: str) -> list[zipfile.ZipInfo]:
         raise RasterTooLargeError(
             f"It has more than {MOST_TILES:,} tiles.", where=filename, advice="Pack those around the flight."
         )
+    check_surfaces((member.filename for member in found), where=filename)
     return found
 
 

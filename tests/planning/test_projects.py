@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from planning.errors import RasterFormatError
+from planning.terrain import projects
 from planning.terrain.geotiff import open_dsm, read_dsm
-from planning.terrain.projects import Project, project_of
+from planning.terrain.projects import Project, is_terrain, project_of, shortened
 from tests.planning.geotiff_samples import hill, write_raster
 
+ROOT = Path(__file__).parents[2]
 ODM = [
     "odm_dem/dsm.tif", "odm_dem/dtm.tif", "odm_orthophoto/odm_orthophoto.tif", "odm_orthophoto/odm_orthophoto.png",
     "odm_georeferencing/odm_georeferenced_model.laz", "odm_report/report.pdf", "cameras.json",
@@ -101,6 +104,54 @@ def test_a_folder_with_a_project_is_its_surface_model(tmp_path: Path) -> None:
     assert "hedgehop cloud odm_georeferencing/odm_georeferenced_model.laz" in caught.value.advice
 
 
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("dtm.tif", True), ("a/hill_DTM_1m.TIF", True), ("dtm1m.tif", True), ("dtm/dem.tif", True),
+        ("3_dsm_ortho/extras/dtm/tile_1.tif", True), ("DGM1/a.tif", True), ("bare-earth.tif", True),
+        ("dsm-ground.tif", True), ("dtm/hill_dsm.tif", False), ("dtm/1_dsm/a.tif", False), ("dsm.tif", False),
+        ("hill.tif", False), ("midtmorning.tif", False), ("dsm_ground_control.tif", False),
+    ],
+)  # fmt: skip
+def test_terrain_models_are_told_by_their_name_or_the_nearest_folders(name: str, says: bool) -> None:
+    assert is_terrain(name) is says
+
+
+def test_a_folder_of_terrain_models_is_refused_and_one_that_is_given_by_name_is_warned_of(tmp_path: Path) -> None:
+    write_raster(make(tmp_path / "all" / "odm_dem.d" / "dtm.tif"), hill())
+    with pytest.raises(RasterFormatError, match=r"only a terrain model \(DTM\), odm_dem\.d/dtm\.tif"):
+        open_dsm(tmp_path / "all")
+    (warning,) = open_dsm(tmp_path / "all" / "odm_dem.d" / "dtm.tif").warnings
+    assert "would fly into them" in warning
+    write_raster(make(tmp_path / "metashape" / "dem.tif"), hill())
+    write_raster(tmp_path / "metashape" / "ortho.tif", np.full((3, 40, 50), 90, np.uint8))
+    (warning,) = open_dsm(tmp_path / "metashape").warnings
+    assert "dem.tif: make sure" in warning
+
+
+def test_a_name_of_any_length_is_shortened_in_messages() -> None:
+    long = f"{'a' * 40_000}/odm_dem/dsm.tif"
+    with pytest.raises(RasterFormatError) as caught:
+        found([long, "b/odm_dem/dsm.tif"])
+    assert len(str(caught.value)) < 400
+    assert "/odm_dem/dsm.tif" in caught.value.what
+    assert shortened("a\x1b[31mb") == "a?[31mb"
+
+
+def test_the_console_tells_dropped_folders_by_the_same_names() -> None:
+    told = json.loads((ROOT / "web/src/store/project_names.json").read_text())
+    programs = {program["name"]: (program["kinds"], program["least"]) for program in told["programs"]}
+    ours = {
+        name: ({kind: found.pattern for kind, found in kinds.items()}, least)
+        for name, kinds, least in projects.PROGRAMS
+    }
+    assert list(programs) == list(ours)
+    assert programs == ours
+    words = (projects.SURFACE, projects.TERRAIN, projects.GROUND)
+    assert (told["surface"], told["terrain"], told["ground"]) == tuple(word.pattern for word in words)
+    assert told["tiles"] == projects.TILES
+
+
 def make(path: Path) -> Path:
-    path.parent.mkdir(exist_ok=True)
+    path.parent.mkdir(parents=True, exist_ok=True)
     return path

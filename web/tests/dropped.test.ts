@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { droppedFiles, folderOf, partsOfProject } from "../src/store/dropped";
+import { droppedFiles, folderOf, partsOfProjects, terrainModels } from "../src/store/dropped";
 
 const file = (name: string) => new File(["x"], name);
 
@@ -62,12 +62,54 @@ describe("dropped files", () => {
     const points = file("points.csv");
     const found = await droppedFiles(drop([odm("all"), { isDirectory: false }], [file("all"), points]));
     expect(found).toContain(points);
-    expect(partsOfProject(found).map((f) => f.name)).toEqual(["dsm.tif", "notes.csv"]);
+    expect(partsOfProjects(found).map((f) => f.name)).toEqual(["dsm.tif", "notes.csv"]);
   });
 
   it("that lie in a folder of tiles, or alone, are no project", async () => {
     const tiles = folderEntry("odm", "/odm", [fileEntry("dsm.tif", "/odm/dsm.tif")]);
     const found = await droppedFiles(drop([tiles], [file("odm")]));
-    expect(partsOfProject([...found, file("x_densified_point_cloud.las")])).toEqual([]);
+    expect(partsOfProjects([...found, file("x_densified_point_cloud.las")])).toEqual([]);
+  });
+
+  const names = (files: readonly File[]) => files.map((f) => f.name);
+
+  async function folder(top: string, paths: readonly string[]): Promise<File[]> {
+    const entries = paths.map((path) => {
+      const [name, ...above] = path.split("/").reverse();
+      return above.reduce<unknown>(
+        (inside, part) => folderEntry(part, `/${top}/${part}`, [inside]),
+        fileEntry(name!, `/${top}/${path}`),
+      );
+    });
+    return droppedFiles(drop([folderEntry(top, `/${top}`, entries)], [file(top)]));
+  }
+
+  it.each([
+    ["Metashape", ["hill_dem.tif", "hill_orthomosaic.tif"]],
+    ["Pix4D without a cloud", ["1_dsm/hill_dsm.tif", "2_mosaic/hill_mosaic_group1.tif", "dtm/hill_dtm.tif"]],
+    ["Pix4D", ["hill_dsm.tif", "hill_densified_point_cloud.las"]],
+    ["WebODM", ["odm_dem/dsm.tif", "odm_dem/dtm.tif"]],
+  ])("of a folder of %s are not taken apart", async (_, paths) => {
+    const found = await folder("survey", paths);
+    expect(found).toHaveLength(paths.length);
+    expect(partsOfProjects(found)).toHaveLength(paths.length);
+  });
+
+  it("of two folders are told apart", async () => {
+    const [project, tiles] = [await folder("a", ["dem.tif", "ortho.tif"]), await folder("b", ["1.tif"])];
+    expect(names(partsOfProjects([...project, ...tiles]))).toEqual(["dem.tif", "ortho.tif"]);
+  });
+
+  it("that are terrain models by their name or folder are told; a file alone is opened", async () => {
+    const found = await folder("survey", [
+      "a_dtm.tif",
+      "b_dsm.tif",
+      "dtm.asc",
+      "points.csv",
+      "dtm_notes.csv",
+    ]);
+    expect(partsOfProjects(found)).toEqual([]);
+    expect(names(terrainModels([...found, file("c_dtm.tif")]))).toEqual(["a_dtm.tif", "dtm.asc"]);
+    expect(names(terrainModels(await folder("dtm", ["1.tif", "2_dsm.tif"])))).toEqual(["1.tif"]);
   });
 });

@@ -9,12 +9,14 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from planning.errors import ParameterError, RasterFormatError
 from planning.terrain.dsm import LARGE_PX, Dsm, SurfaceModel
+from planning.terrain.projects import doubts_of_name
 from planning.terrain.rasters.assemble import ReadReport, assemble
 from planning.terrain.rasters.header import RasterHeader
 from planning.terrain.rasters.heights import doubts, mask_and_scale
 from planning.terrain.rasters.http_ranges import WEAK_WORDS, RemoteFile
 from planning.terrain.rasters.part_of import model_grid, needed_pixels, part_of
 from planning.terrain.rasters.reading import Declared, Pixels, Progress, Read, all_of, read_surface
+from planning.terrain.rasters.tiles import doubts_of_names
 
 AHEAD_PX = 256
 """Decoded around what is asked for: the next question is mostly about a little more."""
@@ -33,6 +35,7 @@ class DsmFile(SurfaceModel):
         self._kept: tuple[Pixels, np.ndarray] | None = None
         self._whole: Dsm | None = None
         self._first = read_surface(source, declared, _all_if_small, first=None, progress=progress)
+        self._of_source = _said_of(source, virtual=declared.virtual)
         plan = self._first.plan
         self.transform, self._shape = model_grid(plan)
         self.crs, self.vertical_datum, self.sha256 = plan.crs, plan.reference.vertical_datum, self._first.sha256
@@ -55,9 +58,9 @@ class DsmFile(SurfaceModel):
     def warnings(self) -> tuple[str, ...]:
         """What was assumed or looks wrong, in plain words; of a large file judged by a sample of it."""
         if self.report is not None:
-            return (*self.report.warnings, *_of_remote(self._source))
+            return (*self.report.warnings, *self._of_source)
         plan, sample = self._first.plan, self._first.sample
-        notes = (*plan.notes, *_of_remote(self._source))
+        notes = (*plan.notes, *self._of_source)
         if sample.known == 0:
             return (*notes, "Nothing but unknown cells was found in a sample of it.")
         return (*notes, *doubts(sample, dtype=plan.header.dtypes[0], scaled=plan.scaled))
@@ -139,8 +142,8 @@ def _all_if_small(header: RasterHeader) -> Pixels | None:
     return all_of(header) if header.height_px * header.width_px < LARGE_PX else None
 
 
-def _of_remote(source: Path | RemoteFile) -> tuple[str, ...]:
+def _said_of(source: Path | RemoteFile, *, virtual: bool) -> tuple[str, ...]:
     if isinstance(source, Path):
-        return ()
+        return doubts_of_names(source, virtual=virtual)
     notes = ("The model's SHA-256 is that of its address, size and version: it was not read as a whole.",)
-    return notes if source.is_strong else (*notes, WEAK_WORDS)
+    return (*notes, *([] if source.is_strong else [WEAK_WORDS]), *doubts_of_name(source.name))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from planning.errors import RasterFormatError, RasterTooLargeError
-from planning.terrain.projects import Project, project_of
+from planning.terrain.projects import Project, check_surfaces, doubts_of_name, project_of, shortened
 from planning.terrain.rasters.magic import is_virtual
 from planning.terrain.rasters.mosaic import Claim
 from planning.terrain.rasters.virtual import listed_by
@@ -63,13 +63,21 @@ def _in_folder(folder: Path) -> tuple[Path, ...]:
         raise RasterFormatError(
             "There is no GeoTIFF (.tif, .tiff) in this folder.", where=str(folder), advice="Give the folder of tiles."
         )
+    check_surfaces((path.relative_to(folder).as_posix() for path in found), where=str(folder))
     return tuple(sorted(found))
+
+
+def doubts_of_names(source: Path, *, virtual: bool) -> tuple[str, ...]:
+    """What the names of a surface model's files leave in doubt, in plain words."""
+    tiles = tiles_of(source, virtual=virtual)
+    names = (source, *(tiles.paths if tiles is not None and len(tiles.paths) == 1 else ()))
+    return tuple(dict.fromkeys(note for name in names for note in doubts_of_name(name.name)))
 
 
 def _model_of(project: Project, folder: Path) -> str:
     if project.model is None:
         what = f"This {project.program} project has no surface model."
-        advice = f"Make one of its point cloud first: hedgehop cloud {project.cloud} --out dsm.tif"
+        advice = f"Make one of its point cloud first: hedgehop cloud {shortened(project.cloud or '')} --out dsm.tif"
         raise RasterFormatError(what, where=str(folder), advice=advice)
     return project.model
 

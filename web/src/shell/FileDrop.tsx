@@ -1,7 +1,7 @@
 import { useEffect } from "preact/hooks";
 import { Icon } from "../ui/Icon";
 import { takeRecordings } from "../review/ReviewLeft";
-import { droppedFiles, partsOfProject } from "../store/dropped";
+import { droppedFiles, partsOfProjects, terrainModels } from "../store/dropped";
 import { isObserver, whyObserver } from "../store/flying";
 import { notifyText } from "../store/state";
 import { isRadarLog, recordingsAmong, takeFiles } from "../store/files";
@@ -64,10 +64,16 @@ export function FileDrop() {
     end();
     if (!event.dataTransfer || isObserver.value) return;
     const all = await droppedFiles(event.dataTransfer);
-    const parts = partsOfProject(all);
-    if (parts.length > 0)
+    const parts = new Set(partsOfProjects(all));
+    if (parts.size > 0)
       notifyText("error", "The folder is a mapping project: nothing of it was opened.", "Drop it as a ZIP.");
-    const dropped = all.filter((file) => !parts.includes(file));
+    const terrain = new Set(terrainModels(all.filter((file) => !parts.has(file))));
+    if (terrain.size > 0) {
+      const names = [...terrain].slice(0, 3).map((file) => file.name.slice(-60));
+      const what = `Left out as terrain models (DTM): ${names.join(", ")}${terrain.size > 3 ? " ..." : ""}.`;
+      notifyText("warning", what, "Trees and buildings are missing in them. Drop the surface model (DSM).");
+    }
+    const dropped = all.filter((file) => !parts.has(file) && !terrain.has(file));
     const recordings = await recordingsAmong(dropped);
     takeRecordings([...recordings]);
     const files = dropped.filter((file) => !recordings.has(file));

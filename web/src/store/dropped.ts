@@ -1,5 +1,7 @@
 /** Files of dropped folders, and where they lay: the browser tells nothing of single files' folders. */
 
+import { isTerrainModel, programOf } from "./projects";
+
 const folders = new WeakMap<File, string>();
 const DEEPEST = 4;
 const OPENED =
@@ -7,14 +9,21 @@ const OPENED =
 
 export const folderOf = (file: File): string => folders.get(file) ?? "";
 
-const OF_PROJECT =
-  /\/(odm_dem\/dsm|odm_orthophoto\/odm_orthophoto)\.tif$|_densified_point_cloud[^/]*\.la[sz]$/i;
+const pathOf = (file: File) => `${folderOf(file)}/${file.name}`;
 
-/** Files of a dropped folder that is a mapping program's project: apart they would become models that are none. */
-export const partsOfProject = (files: readonly File[]): File[] =>
-  files.some((file) => folderOf(file) && OF_PROJECT.test(`/${folderOf(file)}/${file.name}`))
-    ? files.filter((file) => folderOf(file))
-    : [];
+/** Files of dropped folders that are mapping programs' projects: apart they would become models that are none. */
+export function partsOfProjects(files: readonly File[]): File[] {
+  const tops = new Map<string, File[]>();
+  for (const file of files.filter((file) => folderOf(file))) {
+    const top = folderOf(file).split("/")[0]!;
+    tops.set(top, [...(tops.get(top) ?? []), file]);
+  }
+  return [...tops.values()].filter((inside) => programOf(inside.map(pathOf)) !== null).flat();
+}
+
+/** Rasters of dropped folders that are terrain models by name: trees and buildings are missing in them. */
+export const terrainModels = (files: readonly File[]): File[] =>
+  files.filter((file) => folderOf(file) && isTerrainModel(pathOf(file)));
 
 /** All files dropped; of folders those that can be opened, whichever folder they lie in. */
 export async function droppedFiles(data: DataTransfer): Promise<File[]> {
