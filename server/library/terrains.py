@@ -58,6 +58,7 @@ def store_terrain(
     spikes: Sequence[SpikeDoc] = (),
     warnings: Sequence[str] = (),
     cloud: CloudDoc | None = None,
+    in_doubt: bool = False,
     fill: Callable[[Path], None] = lambda folder: None,
 ) -> TerrainDoc:
     """Adds a model to the data directory ``root``, from any process; raises ``StorageFullError``.
@@ -67,7 +68,7 @@ def store_terrain(
     terrain_id = new_id()
     t = dsm.transform
     doc = _describe(dsm, terrain_id, name=name, origin=origin, spikes=spikes, warnings=warnings)
-    doc = doc.model_copy(update={"cloud": cloud})
+    doc = doc.model_copy(update={"cloud": cloud, "in_doubt": in_doubt})
     with new_directory(root / FOLDER / terrain_id) as folder:
         write_array(folder / _ELEVATION, dsm.elevation_m)
         fill(folder)

@@ -94,6 +94,7 @@ class OnShow:
                 "legend_min_m": low_m,
                 "legend_max_m": high_m,
                 "points_shown": 0 if cloud is None else cloud.shown,
+                "points_state": self._picture.points_state,
                 "points_of": 0 if cloud is None else cloud.points,
                 "points_colored": cloud is not None and cloud.colored,
             }

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import math
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 
@@ -38,13 +39,14 @@ from server.schemas import (
 )
 from server.work.jobs import Lane
 
+PointsState = Literal["none", "loading", "drawn", "failed"]
 log = logging.getLogger("hedgehop.scene")
 
 
 class Picture:
     """Draws the latest wish; wishes that come while it draws are merged into one.
 
-    ``changed()`` is called when the terrain on show is another one.
+    ``changed()`` is called when the terrain on show is another one, and when its points come or go.
     A recording that is open is drawn instead of the plan, unless a vehicle is armed: then the terrain stays as it is.
     """
 
@@ -69,7 +71,8 @@ class Picture:
         self._dsm: Dsm | None = None
         self._points: PointsScene | None = None
         self._points_of: str | None = None
-        """Model whose points were asked for: those that cannot be had are asked for once."""
+        """Model whose points were asked for: those that cannot be had are asked for once while they are wanted."""
+        self._points_state: PointsState = "none"
         self._overlay: tuple[OverlayScene | None, tuple[SiteMark, ...]] = (None, ())
 
     @property
@@ -85,6 +88,11 @@ class Picture:
             return None
         cloud = next((doc.cloud for doc in self._library.terrains() if doc.id == terrain_id), None)
         return cloud if cloud is not None and cloud.shown else None
+
+    @property
+    def points_state(self) -> PointsState:
+        """What has become of the points of the surface model on show."""
+        return self._points_state
 
     @property
     def dsm(self) -> Dsm | None:
@@ -219,24 +227,36 @@ class Picture:
         """Those of the model on show; of another one they are let go."""
         terrain = self._terrain
         terrain_id = None if terrain is None or self.cloud is None else terrain.terrain_id
+        if not wanted and self._points is None:
+            self._points_of = None  # what failed is asked for again
+            self._tell_points("none")
         if terrain_id == self._points_of:
             return
         self._points, self._points_of = None, None
         if terrain is None or terrain_id is None or not wanted:
+            self._tell_points("none")
             return
         self._points_of = terrain_id
+        self._tell_points("loading")
         try:
             directory = self._library.terrain_dir(terrain_id)
             legend_m = terrain.legend_min_m, terrain.legend_max_m
             self._points = await self._lane.call(tasks.draw_points, terrain_id, directory, *legend_m)
+            self._tell_points("drawn")
         except JobCancelledError:
             self._points_of = None
             self._wake.set()
         except NotFoundError:
             # The model is gone, and whoever computes the plan says so.
-            pass
+            self._tell_points("none")
         except Exception as error:
+            self._tell_points("failed")
             self._tell(reported(error, log, "Drawing the points"))
+
+    def _tell_points(self, state: PointsState) -> None:
+        if state != self._points_state:
+            self._points_state = state
+            self._changed()
 
     def _tell(self, error: ErrorDoc) -> None:
         self._pages.publish(NoticeMessage(level="error", error=error))

@@ -80,6 +80,8 @@ class TerrainDoc(Strict):
     """When the file was last changed."""
     cloud: CloudDoc | None = None
     """Null: it comes of no point cloud."""
+    in_doubt: bool = False
+    """What stands on the ground may be missing in it: no plan takes it by itself."""
 
 
 class OrthophotoDoc(Strict):

@@ -42,6 +42,8 @@ class ViewDoc(Strict):
     legend_max_m: float | None = None
     points_shown: int = 0
     """Points that the surface model on show has to draw; 0: it has none."""
+    points_state: Literal["none", "loading", "drawn", "failed"] = "none"
+    """What has become of them; those that failed are asked for again when they are put off and on."""
     points_of: int = 0
     """Points of the file that they are of."""
     points_colored: bool = False

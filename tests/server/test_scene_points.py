@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from planning.terrain.clouds.thin import ThinnedCloud
+from server.errors import StorageError
 from server.plan.picture import Picture
-from server.scene.geometry.payload import PointsScene, SceneState
+from server.scene.geometry.payload import OverlayScene, PointsScene, SceneState
 from server.scene.geometry.stage import Drawing
 from server.scene.geometry.terrain_payload import build_points_scene
 from server.scene.layers.ground_layers import points_nodes, terrain_nodes
@@ -77,6 +78,13 @@ def test_the_model_gives_way_to_points_that_are_there_and_to_nothing_else() -> N
         assert bool(points_nodes(drawn)) == cloud
 
 
+def test_colours_that_are_laid_over_the_model_stay_with_it_beside_points() -> None:
+    drawn = drawing(scene(), show_points=True, show_mesh=False)
+    overlay = OverlayScene("hill", np.zeros((2, 2, 4), np.uint8), 500_000.0, 4_000_000.0, 1.0)
+    assert terrain_nodes(replace(drawn, state=replace(drawn.state, overlay=overlay))) != []
+    assert terrain_nodes(drawn) == []
+
+
 def test_another_plan_sends_no_point_again() -> None:
     layer = next(layer for layer in layers(lambda handle: None) if layer.name == "points")
     drawn = drawing(scene(), show_points=True, show_mesh=False)
@@ -128,3 +136,43 @@ def test_points_are_read_when_they_are_wanted_once_and_told_before() -> None:
         loop.cancel()
 
     asyncio.run(asyncio.wait_for(play(), 30))
+
+
+def test_points_that_failed_are_asked_for_again_once_they_were_put_off() -> None:
+    terrain = state_over(DSM).terrain
+    docs = [SimpleNamespace(id="hill", cloud=CLOUD)]
+    states: list[str] = []
+    asked: list[bool] = []
+    fails = [True, False]
+
+    async def call(task: Any, *_: object) -> object:
+        if task.__name__ == "draw_terrain":
+            return terrain
+        asked.append(fails[0])
+        if fails.pop(0):
+            raise StorageError("The file is damaged.")
+        return scene()
+
+    async def play() -> None:
+        shown = asyncio.Semaphore(0)
+
+        async def show(*_: object) -> None:
+            shown.release()
+
+        library: Any = SimpleNamespace(
+            orthophotos=list, terrains=lambda: docs, terrain_dir=lambda _: None, load_terrain=lambda _: DSM
+        )
+        told = Told()
+        made: list[Picture] = []
+        view: Any = SimpleNamespace(show=show)
+        lane: Any = SimpleNamespace(call=call)
+        made.append(Picture(view, library, lane, told, changed=lambda: states.append(made[0].points_state)))
+        loop = asyncio.create_task(made[0].run())
+        for wanted in (True, True, False, True):
+            made[0].want(PlanDoc(terrain_id="hill"), SelectionDoc(), ViewDoc(show_points=wanted), None, stale=False)
+            await shown.acquire()
+        loop.cancel()
+
+    asyncio.run(asyncio.wait_for(play(), 30))
+    assert asked == [True, False]
+    assert states == ["none", "loading", "failed", "none", "loading", "drawn"]

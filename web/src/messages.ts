@@ -1223,6 +1223,8 @@ export interface TerrainDoc {
   file_utc: string | null;
   /** Null: it comes of no point cloud. */
   cloud: CloudDoc | null;
+  /** What stands on the ground may be missing in it: no plan takes it by itself. */
+  in_doubt: boolean;
 }
 
 export interface OrthophotoDoc {
@@ -1292,6 +1294,8 @@ export interface ViewDoc {
   legend_max_m: number | null;
   /** Points that the surface model on show has to draw; 0: it has none. */
   points_shown: number;
+  /** What has become of them; those that failed are asked for again when they are put off and on. */
+  points_state: "none" | "loading" | "drawn" | "failed";
   /** Points of the file that they are of. */
   points_of: number;
   /** By the file; else by height, as the model is. */

@@ -66,8 +66,8 @@ class Drawing:
 
     @property
     def has_mesh(self) -> bool:
-        """Without its points the model itself is drawn whatever the view says."""
-        return self.state.view.show_mesh or self.points is None
+        """Without its points, and under colours that are laid over it, the model is drawn whatever the view says."""
+        return self.state.view.show_mesh or self.points is None or self.state.overlay is not None
 
     def places_xy_m(self, places: Sequence[_Place]) -> F64:
         """(N, 2) projected"""

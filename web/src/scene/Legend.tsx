@@ -2,6 +2,7 @@ import { many, metres, number } from "../format";
 import { trackVersion, tracks } from "../store/flying";
 import { review } from "../store/review";
 import { result, terrain, view } from "../store/state";
+import { hasTraversability } from "../store/traversability";
 
 function HeightScale() {
   const { legend_min_m, legend_max_m } = view.value;
@@ -26,10 +27,13 @@ function Key({ kind, label, title }: { kind: string; label: string; title?: stri
   );
 }
 
-/** How many points of the cloud are drawn; null: none. */
+/** How many points of the cloud are drawn, or why none is; null: none is asked for. */
 function pointsDrawn(): string | null {
-  const { show_points, points_shown, points_of } = view.value;
-  return show_points && points_shown > 0 ? `${number(points_shown)} of ${many(points_of)} points` : null;
+  const { show_points, points_shown, points_state, points_of } = view.value;
+  if (!show_points || points_shown === 0) return null;
+  if (points_state === "loading") return "Points are loading…";
+  if (points_state === "failed") return "The points cannot be drawn";
+  return points_state === "drawn" ? `${number(points_shown)} of ${many(points_of)} points` : null;
 }
 
 /** What the colours of the 3D view mean, in one line along its lower edge: of what is drawn, nothing else. */
@@ -39,9 +43,12 @@ export function Legend() {
   const planned = result.value !== null && !isReview;
   const flown = !isReview && trackVersion.live.value > 0 && tracks.live.s_m.length > 0;
   const hasUnknown = (terrain.value?.unknown_share ?? 0) > 0;
-  const { show_mesh, points_colored } = view.value;
+  const { show_points, show_mesh, show_traversability, points_colored, points_state } = view.value;
   const points = pointsDrawn();
-  const byHeight = points && !show_mesh ? !points_colored : shading === "height";
+  // Colours on the ground keep the model on show.
+  const isCovered = show_traversability && hasTraversability.value;
+  const inPlace = points_state === "drawn" && show_points && !show_mesh && !isCovered;
+  const byHeight = inPlace ? !points_colored : shading === "height";
   const isEmpty =
     !byHeight &&
     !points &&
@@ -54,7 +61,8 @@ export function Legend() {
     <div class="legend overlay" data-testid="legend">
       {byHeight && <HeightScale />}
       {points && (
-        <span class="number" data-testid="points-drawn" title="Thinned evenly for drawing">
+        <span class="number" data-testid="points-drawn" role="status" title="Thinned evenly for drawing">
+          {points_state === "loading" && <span class="spinner" aria-hidden="true" />}
           {points}
         </span>
       )}

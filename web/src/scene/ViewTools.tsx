@@ -10,7 +10,7 @@ type Layer =
   "show_points" | "show_mesh" | "show_surface" | "show_path" | "show_unknown" | "show_traversability";
 
 const LAYERS: readonly { layer: Layer; label: string; title: string }[] = [
-  { layer: "show_points", label: "Points", title: "The point cloud in place of the model made of it" },
+  { layer: "show_points", label: "Points", title: "The point cloud in place of the model" },
   { layer: "show_mesh", label: "Model", title: "The model beside its points: it hides those below it" },
   { layer: "show_surface", label: "Surface", title: "The safe surface" },
   { layer: "show_path", label: "Path", title: "The path and the mission as it will be flown" },

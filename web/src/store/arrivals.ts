@@ -33,7 +33,7 @@ effect(() => {
   for (const entry of arrivalsOf(terrains, seen)) {
     const sent = sentFileOf(entry.name);
     // A plan without points takes the model by itself, on the server.
-    if (sent?.replaces && document_.peek()?.pois.length) useTerrain(entry);
+    if (sent?.replaces && !entry.in_doubt && document_.peek()?.pois.length) useTerrain(entry);
     else if (sent) offered.value = entry.id;
   }
   seen = new Set(terrains.map((entry) => entry.id));

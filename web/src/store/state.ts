@@ -46,6 +46,7 @@ export const view = signal<ViewDoc>({
   legend_min_m: null,
   legend_max_m: null,
   points_shown: 0,
+  points_state: "none",
   points_of: 0,
   points_colored: false,
 });
