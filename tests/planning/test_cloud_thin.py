@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import laspy
 import numpy as np
@@ -12,8 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapping.geometry.arrays import F64, U16
+from planning.terrain.clouds import decode
 from planning.terrain.clouds.cloud_tables import pcd_table, ply_table
-from planning.terrain.clouds.read import CloudParams, read_cloud
+from planning.terrain.clouds.read import CloudParams, _left_out, read_cloud
 from planning.terrain.clouds.thin import ThinnedCloud, Thinner, highest_of_each
 from tests.planning.cloud_samples import CORNER, some_points, write_e57, write_las, write_pcd, write_ply
 
@@ -161,3 +163,23 @@ def test_fields_that_only_sound_like_colours_are_none(tmp_path: Path) -> None:
     found = read_cloud(write_e57(tmp_path / "a.e57", [xyz]), CloudParams(crs="EPSG:32633", most_points=10)).thinned
     assert found is not None
     assert found.rgb is None
+
+
+def test_of_very_many_points_some_are_looked_at_and_the_model_is_of_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(decode, "_MOST_THINNED", 300)
+    xyz = (CORNER + np.random.default_rng(1).uniform(0, 20, (1000, 3))).round(3)
+    cloud = write_las(tmp_path / "a.las", xyz, np.full(1000, 2, np.uint8))
+    sent: list[dict[str, Any]] = []
+    job = {
+        "source": str(cloud),
+        "format": "las",
+        **{name: str(tmp_path / name) for name in ("target", "points", "colors", "ground")},
+    }
+    order = {"cell_m": 1.0, "xy_m": 1.0, "z_m": 1.0, "max_px": 10**6, "keep_noise": False, "most_points": 5000}
+    decode.read_cloud(job, lambda kind, **told: sent.append({"kind": kind, **told}), lambda header: order)
+    done = sent[-1]
+    assert (done["kind"], done["taken"], done["every"], done["shown"]) == ("done", 1000, 4, 250)
+    assert any("one of each 4" in note for note in _left_out({**done, "cell_m": 1.0}))
+    assert not any("one of each" in note for note in _left_out({**done, "every": 1}))

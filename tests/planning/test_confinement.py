@@ -155,3 +155,10 @@ def test_a_filter_that_is_refused_ends_the_process(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(confinement, "_filter", lambda *, runs_programs: b"\xff" * 8)
     with pytest.raises(confinement.ConfinementError, match="seccomp"):
         confinement.confine(runs_programs=True)
+
+
+def test_errors_name_the_operators_file_and_no_directory_of_ours(tmp_path: Path) -> None:
+    said = f"Cannot open {tmp_path}/0a1b2c: bad block in {tmp_path}/0a1b2c.aux; see {tmp_path.parent}/other"
+    told = sandbox._public(said, tmp_path, "a\\1 b.tif")
+    assert told == f"Cannot open a\\1 b.tif: bad block in a\\1 b.tif; see {tmp_path.parent}/other"
+    assert sandbox._public(f"No {tmp_path}/x", tmp_path, "") == "No the file"

@@ -19,6 +19,8 @@ from planning.terrain.clouds.thin import Thinner
 Json = dict[str, Any]
 Send = Callable[..., None]
 Ask = Callable[[Json], Json]
+_MOST_THINNED = 50_000_000
+"""Points among which those that are shown are chosen: choosing costs 0.6 s for each million, reading less."""
 
 
 def read_cloud(job: Json, send: Send, ask: Ask) -> None:
@@ -41,7 +43,7 @@ def read_cloud(job: Json, send: Send, ask: Ask) -> None:
     send(
         "done", west_m=grid.west_m, north_m=grid.north_m, cell_m=grid.cell_m, shape=grid.shape, taken=sorter.taken,
         ground=sorter.ground, noise=sorter.noise, not_numbers=sorter.not_numbers, step_m=_step_m(cloud, grid),
-        classes=sorter.classes.tolist(), **_thinned(thinner, job, send),
+        classes=sorter.classes.tolist(), every=_every(cloud), **_thinned(thinner, job, send),
     )  # fmt: skip
 
 
@@ -70,11 +72,13 @@ def _sorted(cloud: Cloud, job: Json, order: Json, send: Send) -> tuple[Sorter, T
     grid = grid_for(bounds, order["cell_m"] or cell_for(bounds, cloud.rows), max_px=order["max_px"])
     heights = _empty(job["target"], grid)
     sorter = Sorter(grid, heights, _empty(job["ground"], grid) if cloud.classified else None, order["keep_noise"])
-    thinner, done = Thinner.over(bounds, cloud.rows, most=order["most_points"]) if order["most_points"] else None, 0
+    every, done = _every(cloud), 0
+    most = order["most_points"]
+    thinner = Thinner.over(bounds, cloud.rows // every, most=most) if most else None
     for xyz_m, classes, rgb in _in_metres(cloud, order, colors=thinner is not None):
         taken = sorter.add(xyz_m, classes)
         if thinner is not None:
-            thinner.add(xyz_m[taken], None if rgb is None else rgb[taken])
+            thinner.add(xyz_m[taken][::every], None if rgb is None else rgb[taken][::every])
         done += len(xyz_m)
         send("progress", stage="sort", share=done / cloud.rows)
     if sorter.outside:
@@ -89,6 +93,11 @@ def _sorted(cloud: Cloud, job: Json, order: Json, send: Send) -> tuple[Sorter, T
             grown[np.isneginf(grown)] = np.nan
             grown.flush()  # pyright: ignore[reportAttributeAccessIssue]
     return sorter, thinner
+
+
+def _every(cloud: Cloud) -> int:
+    """Which of the points are looked at for those that are shown: each, or each second ..."""
+    return -(-cloud.rows // _MOST_THINNED) or 1
 
 
 def _thinned(thinner: Thinner | None, job: Json, send: Send) -> Json:

@@ -155,9 +155,14 @@ def _model(
 def _left_out(found: dict[str, Any]) -> list[str]:
     notes = []
     if found["noise"]:
-        notes.append(f"{found['noise']:,} points that the file calls noise were left out; --keep-noise takes them.")
+        notes.append(f"{found['noise']:,} points that the file calls noise were left out (classes 7 and 18).")
     if found["not_numbers"]:
         notes.append(f"{found['not_numbers']:,} points without a place or height were left out.")
+    if found["shown"] and found["every"] > 1:
+        notes.append(
+            f"The points that are shown were chosen among one of each {found['every']}: there are so many. The surface "
+            "model is of all of them."
+        )
     if found["step_m"] > _COARSE * found["cell_m"]:
         notes.append(
             f"It keeps places in 32 bits, which at these coordinates are {found['step_m']:g} m apart: "

@@ -37,7 +37,7 @@ class Thinner:
     """One point for each voxel, so that what stands upright keeps its points and dense places lose most.
 
     The voxels double while more points come than are held. Which voxels they are does not depend on the order in which
-    the points come; the highest of all points is always among those that stay.
+    the points come; the highest of all that are added is always among those that stay.
     """
 
     corner_m: tuple[float, float]

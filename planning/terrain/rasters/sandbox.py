@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -94,7 +95,8 @@ def run_job(
                     return message
                 elif kind == "error":
                     error = _ERRORS.get(message["kind"], RasterError)
-                    raise error(message["what"], where=where, advice=message["advice"])
+                    what, advice = (_public(message[part], directory, where) for part in ("what", "advice"))
+                    raise error(what, where=where, advice=advice)
             worker.wait()
             raise _death(worker.returncode, late_after_s=clock.passed_s, where=where, smaller=smaller)
         except BrokenPipeError as error:
@@ -103,6 +105,11 @@ def run_job(
         finally:
             clock.stop()
             _end(worker)
+
+
+def _public(text: str, directory: Path, where: str) -> str:
+    """Libraries name the file by our own link to it: the operator's name in its place."""
+    return re.sub(rf"{re.escape(str(directory))}[\w./-]*", lambda _: where or "the file", text)
 
 
 def _start(directory: Path, stderr: IO[bytes], *pipe: int) -> subprocess.Popen[bytes]:
