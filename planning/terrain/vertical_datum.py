@@ -53,3 +53,29 @@ def _registered(name: str) -> bool:
         and not _NOT_SEA_LEVEL.search(vertical.name.lower())
         and all(axis.direction == "up" for axis in vertical.axis_info)
     )
+
+
+def datums_differ(one: str | None, other: str | None) -> bool:
+    """Whether both are named and name different datums: "NAVD88 height (ftUS)" is that of "NAVD88"."""
+    return bool(one and other) and _datum(str(one)) != _datum(str(other))
+
+
+def _datum(name: str) -> str:
+    """The datum's own name where the registry knows it, else the name's words without those that tell nothing."""
+    from pyproj import CRS
+    from pyproj.exceptions import CRSError
+
+    for known in (name.strip(), f"{name.strip()} height"):
+        try:
+            system = CRS.from_user_input(known)
+        except CRSError:
+            continue
+        vertical = system.sub_crs_list[1] if system.is_compound else system
+        if vertical.is_vertical and vertical.datum:
+            return _plain(vertical.datum.name)
+    return "ellipsoid" if "ellipsoid" in name.lower() else _plain(name)
+
+
+def _plain(name: str) -> str:
+    words = re.sub(r"\(.*?\)|[_\s-]+", " ", name.lower())
+    return re.sub(r"\b(geoid(al)?|orthometric|heights?|above)\b|\s+", "", words)

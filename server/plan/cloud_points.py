@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from planning.terrain.clouds.thin import ThinnedCloud
-from server.errors import NotFoundError
+from server.errors import NotFoundError, StorageError
 from server.library.shelf import read_manifest
 from server.library.stored_arrays import read_array, write_array
 from server.library.terrains import TerrainManifest
@@ -22,11 +22,15 @@ def write_points(folder: Path, cloud: ThinnedCloud) -> None:
         write_array(folder / _COLORS, cloud.rgb)
 
 
-def copy_points(source: Path, folder: Path) -> None:
-    """From one surface model's folder to another's, where there are any."""
-    told = read_manifest(source, TerrainManifest).doc.cloud
-    if told is not None and told.shown:
-        write_points(folder, read_points(source))
+def points_to_keep(directory: Path) -> tuple[ThinnedCloud | None, tuple[str, ...]]:
+    """Those of a model of which a copy is made, where there are any; damaged ones are left behind, and that is said."""
+    told = read_manifest(directory, TerrainManifest).doc.cloud
+    if told is None or not told.shown:
+        return None, ()
+    try:
+        return read_points(directory), ()
+    except StorageError as error:
+        return None, (f"The points of its cloud were left out. {error}",)
 
 
 def read_points(directory: Path) -> ThinnedCloud:

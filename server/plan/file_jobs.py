@@ -14,7 +14,7 @@ from server.plan import file_tasks
 from server.plan.archives import remove_upload
 from server.plan.on_show import OnShow
 from server.plan.plan_desk import PlanDesk
-from server.schemas import JobDoc, OrthophotoDoc, Pages, PlanDoc, TerrainDoc
+from server.schemas import ErrorDoc, JobDoc, NoticeMessage, OrthophotoDoc, Pages, PlanDoc, TerrainDoc
 from server.work.job_board import JobBoard
 from server.work.jobs import Lane, Progress
 
@@ -60,6 +60,8 @@ class FileJobs:
                 ),
             )
             photos = [photo.id for photo in self._library.orthophotos() if photo.terrain_id == terrain.id]
+            if terrain.in_doubt:
+                self._pages.publish(_not_taken(terrain))
             await self._desk.propose(lambda document: use_if_free(document, terrain, next(iter(photos), None)))
 
         return self._board.start(f"Reading {filename}", work, clean=lambda: remove_upload(upload))
@@ -116,20 +118,33 @@ class FileJobs:
         await self._desk.propose(drape)
 
     async def _made(self, making: Awaitable[T]) -> T:
-        """Takes what a worker stores into the library; a worker that was killed while storing leaves nothing."""
+        """Takes what a worker stores into the library; a worker that was killed while storing leaves nothing half.
+
+        What it had stored whole by then, a model whose orthophoto was to follow, is in the library as well.
+        """
         try:
             made = await making
         except Exception:
             await asyncio.to_thread(self._library.clear_unfinished)
+            await self._take_in()
             raise
+        await self._take_in()
+        return made
+
+    async def _take_in(self) -> None:
         await asyncio.to_thread(self._library.refresh)
         self._pages.publish(self._library.message())
-        return made
+
+
+def _not_taken(terrain: TerrainDoc) -> NoticeMessage:
+    what = "Parts of the point cloud stand above this surface model, so no plan took it by itself."
+    advice = "Read what is said of it in Plan before you use it."
+    return NoticeMessage(level="warning", error=ErrorDoc(code="in_doubt", what=what, where=terrain.name, advice=advice))
 
 
 def use_if_free(document: PlanDoc, terrain: TerrainDoc, photo_id: str | None) -> tuple[str, PlanDoc] | None:
-    """With the orthophoto that came with it, which is there to be chosen and not yet draped."""
-    if document.terrain_id is not None and (document.pois or document.survey.polygon):
+    """Not one in doubt. With the orthophoto that came with it, which is there to be chosen and not yet draped."""
+    if terrain.in_doubt or (document.terrain_id is not None and (document.pois or document.survey.polygon)):
         return None
     taken = on_terrain(document, terrain.id).model_copy(update={"orthophoto_id": photo_id})
     return f"Use {terrain.name[:40]}", taken

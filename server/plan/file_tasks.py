@@ -15,6 +15,7 @@ from planning.ground.demo_hillside import demo_dsm, small_hill
 from planning.terrain.clouds.cloud_header import is_cloud
 from planning.terrain.clouds.read import CloudParams
 from planning.terrain.geotiff import read_dsm_reported, read_orthophoto
+from planning.terrain.projects import doubts_of_name
 from planning.terrain.spikes import find_spikes
 from planning.terrain.spikes import remove_spikes as without
 from server.errors import error_doc
@@ -24,7 +25,7 @@ from server.library.orthophotos import store_orthophoto
 from server.library.shelf import read_manifest
 from server.library.terrains import Origin, TerrainManifest, load_terrain, spike_docs, store_terrain
 from server.plan import archives
-from server.plan.cloud_points import copy_points
+from server.plan.cloud_points import points_to_keep, write_points
 from server.plan.cloud_task import import_cloud
 from server.plan.project_task import Unpacked, import_project, project_in, unpacked_project
 from server.plan.tile_archive import unpacked_tiles
@@ -81,7 +82,8 @@ def import_terrain(
         )
     report("Storing", None)
     spikes = () if found.spikes_removed else found.spikes
-    return store_terrain(root, dsm, name=filename, origin=origin, spikes=spike_docs(spikes), warnings=found.warnings)
+    warnings = (*found.warnings, *doubts_of_name(f"{origin.folder}/{filename}"))
+    return store_terrain(root, dsm, name=filename, origin=origin, spikes=spike_docs(spikes), warnings=warnings)
 
 
 @contextmanager
@@ -146,14 +148,19 @@ def without_spikes(root: Path, terrain_dir: Path, *, report: Progress) -> Terrai
     report("Looking for spikes", None)
     spikes = find_spikes(dsm)
     report("Storing", None)
+    points, lost = points_to_keep(terrain_dir)
+    cloud = None if before.cloud is None else before.cloud.model_copy(update=_HEIGHTS_OF_BEFORE)
+    if cloud is not None and points is None:
+        cloud = cloud.model_copy(update={"shown": 0})
     return store_terrain(
         root,
         without(dsm, spikes),
         name=f"{before.name} without spikes",
         origin=Origin(before.folder, before.file_utc),
-        warnings=[*before.warnings, f"{len(spikes)} isolated spikes and pits were removed."],
-        cloud=None if before.cloud is None else before.cloud.model_copy(update=_HEIGHTS_OF_BEFORE),
-        fill=lambda folder: copy_points(terrain_dir, folder),
+        warnings=[*before.warnings, f"{len(spikes)} isolated spikes and pits were removed.", *lost],
+        in_doubt=before.in_doubt,
+        cloud=cloud,
+        fill=lambda folder: None if points is None else write_points(folder, points),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,9 +16,10 @@ from planning.terrain.clouds.thin import ThinnedCloud
 from planning.terrain.dsm import Dsm
 from planning.terrain.geotiff import read_dsm_reported, read_orthophoto
 from planning.terrain.orthophoto import Orthophoto
-from planning.terrain.projects import Project, project_of
+from planning.terrain.projects import Project, doubts_of_name, project_of, shortened
+from server.errors import BadRequestError, StorageFullError
 from server.library.orthophotos import store_orthophoto
-from server.library.terrains import Origin, spike_docs, store_terrain
+from server.library.terrains import FOLDER, Origin, spike_docs, store_terrain
 from server.plan import archives
 from server.plan.beside_model import offset_of, placed_on
 from server.plan.cloud_points import write_points
@@ -27,6 +29,8 @@ from server.work.jobs import Progress
 
 _MOST_BYTES = 16 * 2**30
 _CELL_M = 1.0
+_MOST_SAID = 5
+_LONGEST_PATH_BYTES = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,13 +52,25 @@ class Beside:
     points: ThinnedCloud | None = None
     doc: CloudDoc | None = None
     notes: tuple[str, ...] = ()
+    is_above: bool = False
+    """Whether parts of the cloud stand above the model."""
 
 
 def project_in(upload: Path, filename: str) -> Project | None:
     """None for an archive of tiles. Raises RasterFormatError, BadRequestError, TooLargeError."""
     with archives.opened(upload, filename) as archive:
         names = [member.filename for member in archive.infolist() if not member.is_dir()]
-    return project_of(names, where=filename)
+    project = project_of(names, where=filename)
+    if project is not None:
+        for name in (project.model, project.orthophoto, project.cloud, project.offset):
+            _check_length(name or "", filename)
+    return project
+
+
+def _check_length(name: str, filename: str) -> None:
+    if (length := len(name.encode(errors="surrogateescape"))) > _LONGEST_PATH_BYTES:
+        what = f"A file's path in the archive has {length:,} bytes; {_LONGEST_PATH_BYTES:,} are the most."
+        raise BadRequestError(what, where=filename, advice="Give its files shorter names and pack it again.")
 
 
 @contextmanager
@@ -62,7 +78,8 @@ def unpacked_project(upload: Path, filename: str, project: Project, report: Prog
     """As long as it is read, under names of our own. Raises RasterFormatError where it has no surface model."""
     if project.model is None:
         what = f"This {project.program} project has no surface model."
-        advice = f"Export it with one (DSM), or open its point cloud alone ({project.cloud}): a model is made of it."
+        cloud = shortened(project.cloud or "")
+        advice = f"Export it with one (DSM), or open its point cloud alone ({cloud}): a model is made of it."
         raise RasterFormatError(what, where=filename, advice=advice)
     report("Unpacking", None)
     wanted = (project.model, project.orthophoto, project.cloud, project.offset)
@@ -82,7 +99,7 @@ def import_project(
     report: Progress,
 ) -> TerrainDoc:  # fmt: skip
     """What cannot be laid beside the surface model is left out and said; the model itself raises RasterError."""
-    with archives.named(found.model, f"{filename}, {found.project.model}"):
+    with archives.named(found.model, f"{filename}, {shortened(found.project.model or '')}"):
         dsm, said = read_dsm_reported(
             found.model,
             crs=params.crs,
@@ -91,8 +108,10 @@ def import_project(
             remove_spikes=without_spikes,
             progress=lambda stage, share: report("Reading the surface model", share),
         )
+    found.model.unlink(missing_ok=True)  # there may be room for what is read, and not for both
     photo, cloud = _photo(found, dsm, report), _cloud(found, dsm, params, report)
     report("Storing", None)
+    _check_room(root, dsm, photo, cloud)
     left = () if said.spikes_removed else said.spikes
     doc = store_terrain(
         root,
@@ -100,26 +119,59 @@ def import_project(
         name=filename,
         origin=origin,
         spikes=spike_docs(left),
-        warnings=[*said.warnings, *photo.notes, *cloud.notes, *_left_out(found.project)],
+        warnings=[
+            *said.warnings,
+            *doubts_of_name(found.project.model or ""),
+            *photo.notes,
+            *cloud.notes,
+            *_left_out(found.project),
+        ],
         cloud=cloud.doc,
+        in_doubt=cloud.is_above,
         fill=lambda folder: None if cloud.points is None else write_points(folder, cloud.points),
     )
     if photo.photo is not None:
-        name = PurePosixPath(found.project.orthophoto or "").name
-        store_orthophoto(root, photo.photo, name=name, terrain_id=doc.id)
+        name = shortened(PurePosixPath(found.project.orthophoto or "").name)
+        with _undone(root / FOLDER / doc.id):
+            store_orthophoto(root, photo.photo, name=name, terrain_id=doc.id)
     return doc
+
+
+def free_bytes(root: Path) -> int:
+    """Of the disk that the library lies on."""
+    return shutil.disk_usage(root).free
+
+
+def _check_room(root: Path, dsm: Dsm, photo: Beside, cloud: Beside) -> None:
+    arrays = [dsm.elevation_m, photo.photo and photo.photo.rgb, cloud.points and cloud.points.xyz_m]
+    size, room = sum(each.nbytes for each in arrays if each is not None), free_bytes(root) - archives.LEFT_FREE_BYTES
+    if size > room:
+        what = f"The surface model and what came with it take {size / 1e6:,.1f} MB, more than there is room for."
+        raise StorageFullError(what, advice="Free some space on the disk and try again.")
+
+
+@contextmanager
+def _undone(terrain_dir: Path) -> Iterator[None]:
+    """What fails after the model was stored leaves no model: the job says that it failed."""
+    try:
+        yield
+    except BaseException:
+        shutil.rmtree(terrain_dir, ignore_errors=True)
+        raise
 
 
 def _left_out(project: Project) -> list[str]:
     if not project.more:
         return []
-    return [f"Of this {project.program} project more was left out: {', '.join(project.more)[:300]}."]
+    names = [shortened(name) for name in project.more[:_MOST_SAID]]
+    more = ", ".join([*names, "..."] if len(project.more) > _MOST_SAID else names)
+    return [f"Of this {project.program} project more was left out: {more}."]
 
 
 def _photo(found: Unpacked, dsm: Dsm, report: Progress) -> Beside:
     """In another system it is brought into the model's; in none that it names, it is taken to be in that."""
-    name, path = found.project.orthophoto, found.orthophoto
-    if name is None or path is None:
+    name, path = shortened(found.project.orthophoto or ""), found.orthophoto
+    if path is None:
         return Beside()
 
     def read(declared_crs: str | None) -> Orthophoto:
@@ -141,25 +193,30 @@ def _photo(found: Unpacked, dsm: Dsm, report: Progress) -> Beside:
                 return Beside(photo=read(dsm.crs.to_wkt()), notes=(note,))
     except PlanningError as error:
         return Beside(notes=(f"The orthophoto is left out. {error}",))
+    finally:
+        path.unlink(missing_ok=True)
 
 
 def _cloud(found: Unpacked, dsm: Dsm, params: CloudParams, report: Progress) -> Beside:
-    name, path = found.project.cloud, found.cloud
-    if name is None or path is None:
+    name, path = shortened(found.project.cloud or ""), found.cloud
+    if path is None:
         return Beside()
     report("Reading the point cloud", 0.0)
-    # Its cells are of no use here: large ones, so that no cloud is too large for them.
-    how = CloudParams(max(_CELL_M, dsm.resolution_m), keep_noise=params.keep_noise, most_points=MOST_POINTS)
+    # Its cells are but held against the model: large ones, so that no cloud is too large for them.
+    how = CloudParams(max(_CELL_M, dsm.resolution_m), z_scale=params.z_scale, most_points=MOST_POINTS)
     try:
         with archives.named(path, name):
             made, says_where = _read(path, how, dsm, report)
             offset_m = None if found.offset is None else offset_of(found.offset)
     except PlanningError as error:
         return Beside(notes=(f"The point cloud is left out. {error}",))
+    finally:
+        path.unlink(missing_ok=True)
     assert made.thinned is not None
-    crs = made.dsm.crs if says_where else None
-    points, notes = placed_on(dsm, made.thinned, crs, name=name, offset_m=offset_m)
-    return Beside(points=points, doc=None if points is None else cloud_beside_doc(made, points), notes=tuple(notes))
+    placed = placed_on(dsm, made.thinned, made.dsm, has_crs=says_where, name=name, offset_m=offset_m)
+    doc = None if placed.points is None else cloud_beside_doc(made, placed.points)
+    told = tuple(f"{name}: {note}" for note in made.notes)
+    return Beside(points=placed.points, doc=doc, notes=(*told, *placed.notes), is_above=placed.is_above)
 
 
 def _read(path: Path, how: CloudParams, dsm: Dsm, report: Progress) -> tuple[CloudModel, bool]:
