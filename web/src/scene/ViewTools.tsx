@@ -24,8 +24,14 @@ function isThere({ layer }: { layer: Layer }): boolean {
   return (layer !== "show_points" && layer !== "show_mesh") || view.value.points_shown > 0;
 }
 
-/** Without its points the model itself is always drawn. */
-const isBound = (layer: Layer) => layer === "show_mesh" && !view.value.show_points;
+/** Why the model is drawn whatever is pressed; null: it need not be. */
+function boundBy(layer: Layer): string | null {
+  if (layer !== "show_mesh") return null;
+  if (!view.value.show_points) return "Without its points the model is always drawn";
+  return view.value.show_traversability && hasTraversability.value
+    ? "The colours of the ground lie on it"
+    : null;
+}
 
 function toggle(layer: Layer): void {
   const isOn = !view.value[layer];
@@ -43,9 +49,9 @@ export function ViewTools() {
             <button
               type="button"
               key={layer}
-              title={title}
-              aria-pressed={view.value[layer] || isBound(layer)}
-              disabled={isBound(layer)}
+              title={boundBy(layer) ?? title}
+              aria-pressed={view.value[layer] || boundBy(layer) !== null}
+              disabled={boundBy(layer) !== null}
               data-testid={`layer-${layer.slice("show_".length)}`}
               onClick={() => toggle(layer)}
             >
