@@ -293,7 +293,7 @@ class Flying:
         if transfer.direction == "upload" and transfer.phase in ("done", "failed"):
             self.home.on_changed()
 
-    def _on_state(self, state: VehicleState) -> None:
+    async def _on_state(self, state: VehicleState) -> None:
         was_armed = self.live.armed
         self.live.on_state(state)
         self.home.on_state(state)
@@ -302,6 +302,7 @@ class Flying:
             self.desk.on_disarmed()
         if state.armed and not was_armed:
             self._shared.scenarios.on_armed()
+        await self._obstacles.on_state(state)
 
     def _on_text(self, text: VehicleText) -> None:
         if text.severity <= _CRITICAL:

@@ -40,7 +40,7 @@ class ComingDown:
 
     async def come_down(self) -> None:
         try:
-            situation = await asyncio.to_thread(self._around.situation)
+            situation = await self._around.situation()
             planned = RestPlanned(why="Its plan is not known.")
             if situation is not None:
                 planned = await self._lane.call(plan_rest, situation)

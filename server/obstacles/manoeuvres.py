@@ -132,7 +132,7 @@ class Manoeuvres:
 
     async def _renew(self, standing: ObstacleAlert | None, moving: ObstacleAlert | None) -> None:
         try:
-            situation = await asyncio.to_thread(self._around.situation, standing, moving)  # maps may be large
+            situation = await self._around.situation(standing, moving)
             if situation is None or self._watch.avoidance.state == "climbing":
                 self._show(())  # those on show begin where the vehicle is no more
                 return

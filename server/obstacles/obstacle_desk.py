@@ -125,6 +125,7 @@ class ObstacleDesk:
 
     async def clear(self) -> None:
         settings = self._live.settings
+        await self._live.dismiss()
         self._set(replace(settings, clear_count=settings.clear_count + 1))
         await self._keep(replace(self._kept, clear_count=settings.clear_count + 1))
 

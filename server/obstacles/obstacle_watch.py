@@ -42,6 +42,8 @@ log = logging.getLogger("hedgehop.obstacles")
 
 RATE_HZ = 10.0
 """Of a sensor's status to the pages."""
+LATE_S = 2.0
+"""So long after its newest part a map that is not complete is asked for."""
 DEAD_S = 3.0
 """Nodes say at least once a second how they are."""
 _NOBODY_WATCHES = {
@@ -79,6 +81,8 @@ class Watch:
         self.mirrors: dict[MapName, MapMirror] = {name: MapMirror(name) for name in MAP_NAMES}
         self.radar_look: RadarLook | None = None
         self._cloud_look: CloudLook | None = None
+        self._folded_mono_s: dict[MapName, float] = {}
+        self._kept: dict[MapName, ObstacleAlert] = {}
         self.needs_whole = {sensor: asyncio.Event() for sensor in SENSORS}
         """Set when parts of a map are missing here."""
         self.settings = PerceptionSettings()
@@ -110,7 +114,10 @@ class Watch:
         before = self.statuses.get(sensor)
         self.statuses[sensor] = status
         self._heard_mono_s[sensor] = now_s
-        if any(self.mirrors[name].origin is None for name in _filled(status)):
+        for name in _filled(status):
+            if self.mirrors[name].origin is None:
+                self.mirrors[name].expect()
+        if any(self._is_left_incomplete(name, now_s) for name in MAP_NAMES if sensor_of(name) == sensor):
             self.needs_whole[sensor].set()
         changed = before is None or before.state != status.state
         if changed or now_s - self._told_mono_s[sensor] >= 0.8 / RATE_HZ:
@@ -156,14 +163,28 @@ class Watch:
         self.settings = settings
         self.refresh()
 
+    async def on_flight(self, *, flies: bool) -> None:
+        """Whether the vehicle is armed: what was seen in a flight counts until that is over."""
+        for mirror in self.mirrors.values():
+            await asyncio.to_thread(mirror.on_flight, flies=flies)
+        self._tell_kept()
+
+    async def dismiss(self) -> None:
+        """All maps are emptied by order, and what is kept with them."""
+        for mirror in self.mirrors.values():
+            await asyncio.to_thread(mirror.dismiss)
+        self._tell_kept()
+
     async def on_map(self, delta: MapDelta) -> None:
         """In a thread: what is large takes milliseconds, and the next part waits for this one."""
+        self._folded_mono_s[delta.sensor] = self._now_mono_s()
         try:
             if not await asyncio.to_thread(self.mirrors[delta.sensor].fold, delta):
                 self.needs_whole[sensor_of(delta.sensor)].set()
         except Exception as error:
             # Whatever a node sends: the others' maps and all alerts go on.
             log.warning("A part of the %s map: %s", delta.sensor, reported(error, log, "Taking in a map").what)
+        self._tell_kept()
 
     def on_radar_look(self, look: RadarLook) -> None:
         self.radar_look = look
@@ -216,6 +237,8 @@ class Watch:
         self.statuses.clear()
         self._heard_mono_s.clear()
         self._lost.clear()
+        self._kept.clear()
+        self._folded_mono_s.clear()
         for mirror in self.mirrors.values():
             mirror.clear()
         self.radar_look = self._cloud_look = None
@@ -240,6 +263,25 @@ class Watch:
         lost = ObstacleAlert(f"lost-{sensor}-{now_s:.1f}", sensor, "sensor", "begins", now_s, 0.0, now_s, text)
         self._lost[sensor] = lost
         self._tell_own(lost)
+
+    def _is_left_incomplete(self, name: MapName, now_s: float) -> bool:
+        """Parts of a large map take their time."""
+        late = now_s - self._folded_mono_s.get(name, float("-inf")) > LATE_S
+        return late and not self.mirrors[name].is_complete
+
+    def _tell_kept(self) -> None:
+        """What counts, and is drawn no more, is said."""
+        for name in SENSORS:
+            told, mirror, now_s = self._kept.get(name), self.mirrors[name], self._now_mono_s()
+            counts = mirror.kept_count > 0 or mirror.has_forgotten
+            if counts and told is None:
+                text = f"The {name} map began anew: what it had seen counts for ways and returns until the landing."
+                told = ObstacleAlert(f"kept-{name}-{now_s:.1f}", name, "sensor", "begins", now_s, 0.0, now_s, text)
+                self._kept[name] = told
+                self._tell_own(told)
+            elif told is not None and not counts:
+                del self._kept[name]
+                self._tell_own(replace(told, phase="ends", text=f"Nothing that the {name} saw before counts any more."))
 
     def _tell_own(self, alert: ObstacleAlert) -> None:
         now_s = self._now_mono_s()

@@ -36,6 +36,7 @@ from telemetry.bus.link_client import LinkClient
 from telemetry.topics.messages import LinkStatus, Topic
 from telemetry.topics.obstacles import SENSORS, Sensor
 from telemetry.topics.requests import WholeMap
+from telemetry.topics.vehicle import VehicleState
 
 log = logging.getLogger("hedgehop.obstacles")
 
@@ -73,6 +74,9 @@ class Obstacles:
         around = Surroundings(library, aboard, live, self.watches["live"], self.tracks["live"])
         self._manoeuvres = Manoeuvres(around, lane, link)
         self._coming_down = ComingDown(around, link, lane, lease)
+        self._vehicle: str | None = None
+        self._flies = False
+        """The adopted one is armed. One that is out of reach flies on."""
         self._ground = KnownGround(library, bus)
         self.sensor_nodes = SensorNodes(bus, nodes)
         self._drawing = MapDrawing(sights, self.watches, self._manoeuvres, self.tracks)
@@ -122,6 +126,11 @@ class Obstacles:
         await self._nodes.simulated_sensors(ground, world)
         self.desk.avoid_in_demo()
 
+    async def on_state(self, state: VehicleState) -> None:
+        if state.armed is not self._flies:
+            self._flies = state.armed
+            await self.watches["live"].on_flight(flies=state.armed)
+
     def tick(self) -> None:
         self._manoeuvres.tick()
         self.tracks["live"].tick()
@@ -130,6 +139,9 @@ class Obstacles:
         self.on_plan()
         if status.adopted is None:
             self.traffic.forget()
+        elif self._aboard.vehicle != self._vehicle:
+            self._vehicle, self._flies = self._aboard.vehicle, False
+            await self.watches["live"].on_flight(flies=False)
         await self.desk.on_link(status)
 
     def on_plan(self) -> None:

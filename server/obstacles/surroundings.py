@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
+import time
 from collections.abc import Sequence
 
 import numpy as np
 
+from server.errors import NotReadyError
 from server.heard.channel import Channel
 from server.heard.onboard import Aboard
 from server.library import Library
@@ -14,20 +17,39 @@ from server.obstacles.manoeuvre_situation import Situation
 from server.obstacles.moving_objects import TracksWatch
 from server.obstacles.obstacle_watch import Watch
 from server.obstacles.rest_of_plan import Underway
-from server.scene.mirror import Voxels
+from server.scene.mirror import MapMirror, Voxels
 from telemetry.topics.obstacles import SENSORS, ObstacleAlert
 
+COMES_WITHIN_S, LOOK_S = 10.0, 0.02
+"""The largest map that is told comes in eight seconds."""
+_UNKNOWN = "what stands in the way is not known"
+_MEANWHILE = "Until then hold, or steer clear by sight."
 
-def seen_maps(watch: Watch) -> tuple[Voxels, ...]:
-    """What each sensor has seen. They may be large: for a thread."""
-    mirrors = [watch.mirrors[sensor] for sensor in SENSORS]
-    return tuple(mirror.voxels() for mirror in mirrors if mirror.origin is not None)
+
+async def seen_maps(watch: Watch) -> tuple[Voxels, ...]:
+    """What each sensor has seen in this flight, all of it: a map that is just being told is waited for.
+
+    Raises NotReadyError where that does not come, or was too much to be kept.
+    """
+    until_s = time.monotonic() + COMES_WITHIN_S
+    return tuple([voxels for sensor in SENSORS for voxels in await _seen(watch.mirrors[sensor], until_s)])
 
 
-def maps_revision(watch: Watch) -> tuple[tuple[str, int, int], ...]:
-    """Another one: a map is another. Known without looking into them."""
-    mirrors = [watch.mirrors[sensor] for sensor in SENSORS]
-    return tuple((mirror.sensor, mirror.generation, mirror.revision) for mirror in mirrors if mirror.origin is not None)
+async def _seen(mirror: MapMirror, until_s: float) -> tuple[Voxels, ...]:
+    while (seen := await asyncio.to_thread(mirror.seen)) is None:
+        if time.monotonic() > until_s:
+            what = f"Parts of the {mirror.sensor} map have been missing for {COMES_WITHIN_S:.0f} s: {_UNKNOWN}."
+            raise NotReadyError(what, where=mirror.sensor, advice=f"They are asked for; ask again. {_MEANWHILE}")
+        await asyncio.sleep(LOOK_S)
+    if mirror.has_forgotten:
+        what = f"The {mirror.sensor} map began anew, and not all that it had seen could be kept: {_UNKNOWN}."
+        raise NotReadyError(what, where=mirror.sensor, advice=_MEANWHILE)
+    return seen
+
+
+def maps_revision(watch: Watch) -> tuple[int, ...]:
+    """Another one: what sensors have seen may be another. Known without looking into the maps."""
+    return tuple(watch.mirrors[sensor].folds for sensor in SENSORS)
 
 
 def is_same_seen(one: Sequence[Voxels], other: Sequence[Voxels]) -> bool:
@@ -49,12 +71,16 @@ class Surroundings:
         record, state = self._aboard.record, self.live.state
         return None if record is None or state is None else Underway(record, self.live.flight, state)
 
-    def situation(self, standing: ObstacleAlert | None = None, moving: ObstacleAlert | None = None) -> Situation | None:
-        """None without a vehicle, its plan, or the surface model of that. Maps may be large: for a thread."""
+    async def situation(
+        self, standing: ObstacleAlert | None = None, moving: ObstacleAlert | None = None
+    ) -> Situation | None:
+        """None without a vehicle, its plan, or the surface model of that. Raises NotReadyError as ``seen_maps``."""
+        maps = await seen_maps(self.watch)
         record, state = self._aboard.record, self.live.state
         if record is None or state is None:
             return None
-        terrain = terrain_of(FlownOver(record.terrain_id, record.terrain_sha256), self._library.terrains())
+        flown_over = FlownOver(record.terrain_id, record.terrain_sha256)
+        terrain = await asyncio.to_thread(lambda: terrain_of(flown_over, self._library.terrains()))
         if terrain is None:
             return None
         watch, tracks = self.watch, self._tracks.fresh()
@@ -70,7 +96,7 @@ class Surroundings:
             record,
             self._library.terrain_dir(terrain.id),
             origin,
-            seen_maps(watch),
+            maps,
             watch.settings.vehicle_radius_m,
             ceiling_m=watch.settings.climb_ceiling_m,
             radar_high_deg=watch.settings.radar_high_deg,

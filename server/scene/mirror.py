@@ -1,20 +1,27 @@
-"""A copy of one sensor's map, folded from the deltas on the bus, in chunks of 32 m, for drawing and planning."""
+"""A copy of one sensor's map, folded from the deltas on the bus, in chunks of 32 m, for drawing and planning.
+
+What a map held when it began anew in flight is kept for planning: ``seen`` is both.
+"""
 
 from __future__ import annotations
 
 import threading
+import time
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mapping.geometry.arrays import F64, I32, I64, U8, Bools
+from server.scene.kept_voxels import Grid, Kept
 from telemetry.topics.obstacles import MapDelta, MapName, MapOrigin, unpack_keys
 
 ChunkKey = tuple[int, int, int]
 
 CHUNK_M = 32.0
 OCCUPIED_ABOVE = 127
+OWN_S = 5.0
+"""A map that began so short before the vehicle armed is that flight's own: a sensor may hear of the arming first."""
 DETAILS = (1, 2, 4, 8, 16)
 """Edges in voxels of what a drawn box may stand for."""
 _BITS = 20
@@ -63,6 +70,23 @@ class MapMirror:
     """Of the newest delta in it."""
     t_mono_s: float = 0.0
     """Of the newest frame in it."""
+    folds: int = 0
+    """Another one: what is held may be another."""
+    kept_count: int = 0
+    """Voxels that were seen before the map began anew."""
+    has_forgotten: bool = False
+    """More was seen before the map began anew than could be kept."""
+    _kept: Kept = field(default_factory=Kept)
+    _began_mono_s: float = 0.0
+    """As the sensor's node says it."""
+    _began_heard_mono_s: float = float("-inf")
+    _flies: bool = False
+    _is_of_flight: bool = False
+    """What is in the map was seen in this flight."""
+    _parts_in: int = 0
+    _parts: int = 0
+    _lacks: bool = False
+    """Something before the newest delta is missing: only the whole map mends that."""
     _chunks: dict[ChunkKey, Chunk] = field(default_factory=dict)
     _dirty: set[ChunkKey] = field(default_factory=set)
     _lock: threading.Lock = field(default_factory=threading.Lock)
@@ -76,8 +100,32 @@ class MapMirror:
         """As if nothing had ever been heard."""
         with self._lock:
             self._forget()
+            self._kept.forget()
             self.origin, self.resolution_m, self.revision = None, 0.0, 0
+            self._parts_in = self._parts = 0
+            self._lacks = self._is_of_flight = False
             self.generation += 1
+            self._count()
+
+    def on_flight(self, *, flies: bool) -> None:
+        """The vehicle was armed, or disarmed: what is kept is of one flight."""
+        with self._lock:
+            if flies != self._flies:
+                self._flies = flies
+                self._is_of_flight = flies and time.monotonic() - self._began_heard_mono_s <= OWN_S
+                self._kept.forget()
+                self._count()
+
+    def dismiss(self) -> None:
+        """The operator has the map emptied: what is kept is forgotten with it."""
+        with self._lock:
+            self._kept.forget()
+            self._count()
+
+    def expect(self) -> None:
+        """Its node says that it holds something; if nothing of it was heard, that is missing."""
+        with self._lock:
+            self._lacks |= self.origin is None
 
     def fold(self, delta: MapDelta) -> bool:
         """Whether nothing is missing before it. Raises ValueError when the delta's arrays do not belong together."""
@@ -88,10 +136,13 @@ class MapMirror:
             raise ValueError(f"{len(keys)} keys, {len(probability)} probabilities, {len(explained)} verdicts")
         sound = (np.abs(keys) < _OFFSET).all(axis=1)
         with self._lock:
-            complete = delta.whole or self.revision in (delta.since, delta.revision)
+            follows = self._follows(delta)
             self._begin(delta)
+            self._lacks = not follows or (self._lacks and not (delta.whole and delta.part == 0))
+            self._parts_in, self._parts = delta.part + 1, delta.parts
             self._take(keys[sound], probability[sound], explained[sound])
-            return complete
+            self._count()
+            return follows
 
     def taken_dirty(self) -> set[ChunkKey]:
         """Chunks that have changed since they were last asked for; those that are empty now among them."""
@@ -109,6 +160,20 @@ class MapMirror:
         with self._lock:
             return self._voxels(list(self._chunks.values()))
 
+    @property
+    def is_complete(self) -> bool:
+        """No part that was told, or said to come, is missing."""
+        return not self._lacks and self._parts_in >= self._parts
+
+    def seen(self) -> tuple[Voxels, ...] | None:
+        """All that is occupied, and what was seen in this flight before the map began anew; None while parts are
+        missing."""
+        with self._lock:
+            if not self.is_complete:
+                return None
+            now = () if self.origin is None else (self._voxels(list(self._chunks.values())),)
+            return (*now, *(self._kept_voxels(grid) for grid in self._kept.grids))
+
     def boxes(self) -> tuple[int, ...]:
         """How many there would be in all, at each of ``DETAILS``."""
         with self._lock:
@@ -122,13 +187,34 @@ class MapMirror:
 
     # With the lock held
 
+    def _count(self) -> None:
+        self.folds += 1
+        self.kept_count, self.has_forgotten = self._kept.voxel_count, self._kept.is_over_full
+
+    def _follows(self, delta: MapDelta) -> bool:
+        """Whether nothing is missing between what is here and ``delta``."""
+        if delta.part:
+            return delta.part == self._parts_in and delta.revision == self.revision
+        if delta.whole:
+            return True
+        if delta.began_mono_s != self._began_mono_s:
+            return False
+        return self._parts_in >= self._parts and self.revision in (delta.since, delta.revision)
+
     def _forget(self) -> None:
         self._dirty |= self._chunks.keys()
         self._chunks = {}
 
     def _begin(self, delta: MapDelta) -> None:
+        is_whole = delta.whole and delta.part == 0
         moved = self.origin != delta.origin or self.resolution_m != delta.resolution_m
-        if moved or (delta.whole and delta.part == 0):
+        begins = moved or delta.began_mono_s != self._began_mono_s or (is_whole and delta.revision < self.revision)
+        if begins:
+            if self._is_of_flight and self.origin is not None:
+                self._kept.keep((self.origin, self.resolution_m), self._unexplained_ids())
+            self._began_mono_s, self._began_heard_mono_s = delta.began_mono_s, time.monotonic()
+            self._is_of_flight = self._flies
+        if begins or is_whole:
             self._forget()
         if moved:
             self.generation += 1
@@ -138,6 +224,9 @@ class MapMirror:
     def _take(self, keys: I32, probability: U8, explained: Bools) -> None:
         if not len(keys):
             return
+        if self._kept.grids and self.origin is not None:
+            looked = explained | (probability <= OCCUPIED_ABOVE)
+            self._kept.seen_again((self.origin, self.resolution_m), _ids(keys[looked]))
         per_chunk = max(1, round(CHUNK_M / self.resolution_m))
         place = keys // per_chunk
         chunk_ids, ids = _ids(place), _ids(keys)
@@ -163,6 +252,16 @@ class MapMirror:
             self._chunks[key] = Chunk(ids, probability[chosen], explained[chosen], _box_counts(ids))
         else:
             self._chunks.pop(key, None)
+
+    def _unexplained_ids(self) -> I64:
+        nothing = np.zeros(0, np.int64)
+        return np.concatenate([nothing, *(chunk.ids[~chunk.explained] for chunk in self._chunks.values())])
+
+    def _kept_voxels(self, grid: Grid) -> Voxels:
+        origin, resolution_m = grid
+        ids = self._kept.grids[grid]
+        sure, known = np.full(len(ids), 255, np.uint8), np.zeros(len(ids), np.bool_)
+        return Voxels(_keys(ids), sure, known, resolution_m, origin, self.sensor)
 
     def _voxels(self, chunks: list[Chunk]) -> Voxels:
         nothing = Chunk(np.zeros(0, np.int64), np.zeros(0, np.uint8), np.zeros(0, np.bool_))

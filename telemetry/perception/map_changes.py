@@ -18,6 +18,8 @@ from telemetry.topics.obstacles import MapDelta, MapName, MapOrigin
 _NEVER = -1
 AT_ONCE = 2
 BETWEEN_S = 0.02
+LEAST_APART_S = 1e-3
+"""Of two beginnings of a map."""
 MOST_PARTS = 400
 """Eight million voxels. When so many wait, something is wrong, and the map is told whole instead."""
 
@@ -31,6 +33,7 @@ class ChangeTeller:
         self._map: VoxelMap | None = None
         self._origin: MapOrigin | None = None
         self._told = _NEVER
+        self._began_mono_s = 0.0
 
     def forget(self) -> None:
         """The next time the whole map is told."""
@@ -42,6 +45,8 @@ class ChangeTeller:
             return []
         if the_map is not self._map or origin != self._origin:
             self._map, self._origin, self._told = the_map, origin, _NEVER
+            # No beginning has the time of another one.
+            self._began_mono_s = max(t_mono_s, self._began_mono_s + LEAST_APART_S)
         if the_map.revision == self._told:
             return []
         found = the_map.changed_since(self._told, ever_hit_only=True)
@@ -74,6 +79,7 @@ class ChangeTeller:
             probability=b"",
             explained=b"",
             since=since,
+            began_mono_s=self._began_mono_s,
         )
 
 

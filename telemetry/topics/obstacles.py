@@ -65,6 +65,9 @@ class MapDelta:
     """(N,) uint8, 1: known ground"""
     since: int = 0
     """Revision that these changes were made to; who has another one asks for the whole map. Means nothing if whole."""
+    began_mono_s: float = 0.0
+    """Since when there is this map. Another one: it is another map, and what the one before held is not in it because
+    nobody has looked again yet. The same one may be emptied by order, or laid anew from its frames."""
 
 
 def pack_keys(keys: NDArray[np.integer]) -> bytes:

@@ -6,7 +6,6 @@ import asyncio
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -49,7 +48,9 @@ class Bench:
         flies = {"armed": True, "landed": "in_air", "alt_rel_home_m": up_m} if up_m else {}
         self.live.state = replace(stands, position_t_mono_s=now_s, gnss_t_mono_s=now_s, **flies)
         self.live.track.states = [stands, self.live.state]
-        self.mirrors: dict[str, Any] = {name: SimpleNamespace(origin=None) for name in SENSORS}
+        self.mirrors = {name: MapMirror(name) for name in SENSORS}
+        for mirror in self.mirrors.values():
+            mirror.on_flight(flies=up_m > 0.0)
         ways = WayDesk(me.vehicle, self.live, me, made.library, lane, me, Told())
         self.sets = 0
         self.said: list[str] = []
@@ -251,8 +252,8 @@ def test_a_certified_return_is_judged_again_where_sensors_see_something_in_its_w
     async def scenario() -> None:
         monkeypatch.setattr(home_desk, "NEW_MAP_S", 0.0)
         monkeypatch.setattr(home_desk, "LOOK_EVERY_S", 0.02)
-        bench, radar = Bench(made, lane), MapMirror("radar")
-        bench.mirrors["radar"] = radar
+        bench = Bench(made, lane)
+        radar = bench.mirrors["radar"]
         home = home_of(bench.state)
         assert home is not None
         origin = MapOrigin(home.lat_deg, home.lon_deg, home.alt_amsl_m)
@@ -270,7 +271,7 @@ def test_a_certified_return_is_judged_again_where_sensors_see_something_in_its_w
             assert first.state == "certified", first.reasons
             told = len(bench.told)
             radar.fold(delta(aside, probability=250, since=1, revision=2, origin=origin, resolution_m=1.0))
-            await shows(lambda: bench.desk._judged and bench.desk._judged.maps[0][2] == 2)
+            await shows(lambda: bench.desk._judged and bench.desk._judged.maps[0] == radar.folds)
             assert (bench.desk.state.ret, len(bench.told)) == (first, told), "it is the same that is seen"
             radar.fold(delta(mast, since=2, revision=3, origin=origin, resolution_m=1.0))
             await shows(lambda: bench.desk.state.ret != first)
@@ -281,10 +282,22 @@ def test_a_certified_return_is_judged_again_where_sensors_see_something_in_its_w
             (said,) = bench.said
             assert said.startswith("The vehicle's return was certified, and is not any more: ")
             assert second.reasons[0].text in said
-            radar.clear()
-            await shows(lambda: bench.desk.state.ret not in (None, second))
+            # The radar's node is started again: its map is empty, and the mast stands where it stood.
+            radar.fold(delta([], whole=True, revision=0, origin=origin, resolution_m=1.0, began_mono_s=50.0))
+            await shows(lambda: bench.desk._judged and bench.desk._judged.maps[0] == radar.folds)
+            again = bench.desk.state.ret
+            assert again is not None
+            assert (again.state, again.reasons, radar.kept_count) == (second.state, second.reasons, 324)
+            # Home moves, and every map begins anew around it.
+            elsewhere = MapOrigin(home.lat_deg, home.lon_deg + 1e-3, home.alt_amsl_m)
+            radar.fold(delta([], whole=True, revision=0, origin=elsewhere, resolution_m=1.0, began_mono_s=60.0))
+            await shows(lambda: bench.desk._judged and bench.desk._judged.maps[0] == radar.folds)
             assert bench.desk.state.ret is not None
-            assert (bench.desk.state.ret.state, len(bench.said)) == ("certified", 1)
+            assert bench.desk.state.ret.state == "not_certified"
+            # The radar looks there again, and sees nothing.
+            radar.fold(delta(mast, 20, whole=True, revision=1, origin=origin, resolution_m=1.0, began_mono_s=70.0))
+            await shows(lambda: bench.desk.state.ret and bench.desk.state.ret.state == "certified")
+            assert len(bench.said) == 1
         finally:
             judging.cancel()
 
@@ -300,7 +313,7 @@ def test_what_looks_all_the_time_has_it_judged_seldom(
         home = home_of(bench.state)
         assert home is not None
         bench.desk._gathered = await WayDesk.asked(bench.desk._ways, ME, home_desk.ANYWHERE)
-        bench.desk._judged = home_desk._Judged(home, (0.0, 0.0), ret, (("radar", 1, 1),), took_s=4.0)
+        bench.desk._judged = home_desk._Judged(home, (0.0, 0.0), ret, (1, 0, 0), took_s=4.0)
         looks = list[float]()
 
         async def seen(_: object) -> bool:

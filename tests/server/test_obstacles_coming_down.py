@@ -117,11 +117,14 @@ def run(
     watch.on_avoidance(HIGHER)
     link, plans = Link(watch, error), list[Any]()
 
+    async def known() -> object:
+        return object()
+
     async def plan(_task: Any, there: Any) -> RestPlanned:
         plans.append(there)
         return answer
 
-    around: Any = SimpleNamespace(watch=watch, situation=object)
+    around: Any = SimpleNamespace(watch=watch, situation=known)
     lane: Any = SimpleNamespace(call=plan)
     lease: Any = SimpleNamespace(server_operator=lambda: Operator("server", 3))
     down, said = ComingDown(around, cast(Any, link), lane, lease), list[str]()

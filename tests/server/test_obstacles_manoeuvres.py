@@ -39,7 +39,7 @@ class Desk:
         self.told = Told()
         self.watch = Watch("live", self.told)
         self.live = SimpleNamespace(state=None)
-        self.situation: Any = lambda standing, moving: standing or moving
+        self.sees: Any = lambda standing, moving: standing or moving
         self.answers = list(answers)
         self.asked: list[Any] = []
         me: Any = self
@@ -48,6 +48,9 @@ class Desk:
         self.questions: list[MayFlyManoeuvre] = []
         link: Any = SimpleNamespace(call=self._may_fly)
         self.manoeuvres = Manoeuvres(me, me, link)
+
+    async def situation(self, standing: Any, moving: Any) -> Any:
+        return self.sees(standing, moving)
 
     async def _may_fly(self, request: MayFlyManoeuvre) -> str:
         self.questions.append(request)
@@ -188,7 +191,7 @@ def test_a_sidestep_that_is_not_possible_any_more_is_not_flown() -> None:
 def test_what_stands_and_what_moves_are_served_together() -> None:
     pairs: list[tuple[Any, Any]] = []
     desk = Desk((prepared(), side(5.0)), (prepared(), side(5.0)))
-    desk.situation = lambda *both: pairs.append(both) or both[0]
+    desk.sees = lambda *both: pairs.append(both) or both[0]
     desk.manoeuvres.on_alert(approach())
     desk.manoeuvres.on_alert(alert("wall"))
     asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
@@ -208,7 +211,7 @@ def test_while_the_vehicle_climbs_by_itself_nothing_is_prepared() -> None:
     desk = Desk()
     desk.watch.on_avoidance(AvoidanceStatus(enabled=True, state="climbing"))
     asked: list[str] = []
-    desk.situation = lambda standing, moving: asked.append(standing.id) or standing
+    desk.sees = lambda standing, moving: asked.append(standing.id) or standing
     desk.manoeuvres.on_alert(alert())
     asyncio.run(desk.until(lambda: asked))
     assert desk.asked == []

@@ -8,7 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from server.scene.kept_voxels import MOST_GRIDS
 from server.scene.mirror import DETAILS, MapMirror, coarser
+from telemetry.topics.obstacles import MapOrigin
 from tests.server.obstacle_messages import ORIGIN, delta
 
 
@@ -68,6 +70,130 @@ def test_a_missing_part_is_noticed(since: int, revision: int, whole: bool, compl
     mirror = MapMirror("radar")
     mirror.fold(delta([(0, 0, 0)], revision=4, whole=True))
     assert mirror.fold(delta([(1, 0, 0)], since=since, revision=revision, whole=whole)) is complete
+
+
+def kept_in(mirror: MapMirror) -> set[tuple[int, ...]]:
+    seen = mirror.seen()
+    assert seen is not None
+    return {tuple(key) for voxels in seen for key in voxels.keys[~voxels.explained].tolist()}
+
+
+CRANE, GROUND, ELSEWHERE = (4, 0, 20), (4, 0, 0), MapOrigin(37.8, 15.0, 1712.0)
+
+
+def in_flight() -> MapMirror:
+    """With a crane on known ground, seen in this flight."""
+    mirror = MapMirror("radar")
+    mirror.on_flight(flies=True)
+    mirror.fold(delta([CRANE, GROUND], explained=[0, 1], whole=True, revision=7, began_mono_s=1.0))
+    return mirror
+
+
+@pytest.mark.parametrize(
+    "again",
+    [
+        {"began_mono_s": 2.0},
+        {"began_mono_s": 2.0, "revision": 9},
+        {"origin": ELSEWHERE},
+        {"resolution_m": 0.5},
+        {"revision": 6, "began_mono_s": 1.0},
+        {"whole": False, "since": 8, "revision": 9, "began_mono_s": 2.0},
+    ],
+    ids=["started again", "and much seen", "home moved", "finer", "revision went back", "its beginning was missed"],
+)
+def test_what_was_seen_in_flight_counts_when_the_map_begins_anew(again: dict[str, Any]) -> None:
+    mirror = in_flight()
+    mirror.fold(delta([], **{"whole": True, "revision": 0, **again}))
+    if not mirror.is_complete:
+        assert mirror.seen() is None
+        mirror.fold(delta([], **{**again, "whole": True}))
+    assert (kept_in(mirror), mirror.voxel_count, mirror.kept_count) == ({CRANE}, 0, 1)
+    mirror.on_flight(flies=False)
+    assert (kept_in(mirror), mirror.kept_count) == (set(), 0)
+
+
+@pytest.mark.parametrize("looked", [{"probability": 20}, {"explained": 1}], ids=["seen free", "known ground"])
+def test_what_was_kept_is_gone_once_the_new_map_has_seen_there(looked: dict[str, Any]) -> None:
+    mirror = in_flight()
+    mirror.fold(delta([], whole=True, revision=0, began_mono_s=2.0))
+    before = mirror.folds
+    mirror.fold(delta([CRANE], since=0, revision=1, began_mono_s=2.0, **looked))
+    assert mirror.folds > before
+    assert (kept_in(mirror), mirror.kept_count) == (set(), 0)
+
+
+def test_what_the_same_map_says_is_free_and_what_is_emptied_by_order_is_not_kept() -> None:
+    told_again, emptied = in_flight(), in_flight()
+    told_again.fold(delta([], whole=True, revision=8, began_mono_s=1.0))
+    assert kept_in(told_again) == set()
+    emptied.fold(delta([], whole=True, revision=0, began_mono_s=2.0))
+    emptied.dismiss()
+    assert kept_in(emptied) == set()
+    emptied.fold(delta([CRANE], since=0, revision=9, began_mono_s=2.0))
+    emptied.fold(delta([], whole=True, revision=0, began_mono_s=3.0))
+    assert kept_in(emptied) == {CRANE}, "the order was for what was kept then"
+
+
+def test_a_flight_begins_with_nothing_whoever_hears_of_it_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The sensor's map begins anew where the vehicle arms: just before that is heard here, or after."""
+    now_s, first, later = 100.0, MapMirror("radar"), MapMirror("radar")
+    monkeypatch.setattr("server.scene.mirror.time.monotonic", lambda: now_s)
+    for mirror in (first, later):
+        mirror.fold(delta([GROUND], whole=True, began_mono_s=1.0))
+    now_s = 200.0
+    first.fold(delta([], whole=True, began_mono_s=2.0))
+    for mirror in (first, later):
+        mirror.on_flight(flies=True)
+    later.fold(delta([], whole=True, began_mono_s=2.0))
+    for mirror in (first, later):
+        assert kept_in(mirror) == set()
+        mirror.fold(delta([CRANE], since=1, revision=2, began_mono_s=2.0))
+        mirror.fold(delta([], whole=True, began_mono_s=3.0))
+        assert kept_in(mirror) == {CRANE}
+
+
+def test_more_than_can_be_kept_is_said() -> None:
+    mirror = in_flight()
+    for number in range(MOST_GRIDS + 1):
+        assert not mirror.has_forgotten
+        mirror.fold(delta([CRANE], whole=True, origin=MapOrigin(38.0, 15.0, float(number))))
+    mirror.fold(delta([CRANE], whole=True, origin=ELSEWHERE))
+    assert mirror.has_forgotten
+
+
+PARTS = [delta([(k, 0, 0)], whole=True, revision=9, part=k, parts=3) for k in range(3)]
+
+
+@pytest.mark.parametrize("lost", [0, 1, 2])
+def test_half_a_map_is_not_taken_for_one(lost: int) -> None:
+    mirror = MapMirror("radar")
+    mirror.fold(delta([CRANE], whole=True, revision=8))
+    follows = list[bool]()
+    for number, part in enumerate(PARTS):
+        if number != lost:
+            folds = mirror.folds
+            follows.append(mirror.fold(part))
+            assert mirror.folds > folds
+        assert mirror.seen() is None or (lost, number) == (0, 0), "nothing has come yet"
+    next_one = delta([(7, 0, 0)], since=9, revision=10)
+    follows.append(mirror.fold(next_one))
+    assert not all(follows)
+    assert mirror.seen() is None, "what follows does not mend it"
+    for part in PARTS:
+        assert mirror.fold(part)
+    assert mirror.fold(next_one)
+    assert kept_in(mirror) == {(0, 0, 0), (1, 0, 0), (2, 0, 0), (7, 0, 0)}
+
+
+def test_what_is_said_to_be_there_and_was_not_heard_is_missing() -> None:
+    mirror = MapMirror("radar")
+    assert mirror.seen() == ()
+    mirror.expect()
+    assert mirror.seen() is None
+    mirror.fold(delta([CRANE], whole=True))
+    assert kept_in(mirror) == {CRANE}
+    mirror.expect()
+    assert mirror.is_complete
 
 
 def test_what_does_not_belong_together_is_refused_and_absurd_keys_are_left_out() -> None:

@@ -7,10 +7,18 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-from server.obstacles.obstacle_watch import DEAD_S, Watch
+import numpy as np
+import pytest
+
+from mapping.voxels.map import VoxelMap
+from server.errors import NotReadyError
+from server.obstacles.obstacle_watch import DEAD_S, LATE_S, Watch
+from server.obstacles.surroundings import seen_maps
+from server.scene.kept_voxels import MOST_GRIDS
+from telemetry.perception.map_changes import ChangeTeller
 from telemetry.topics.obstacles import AvoidanceStatus, FlightMapStatus
 from tests.server.fakes import Told
-from tests.server.obstacle_messages import alert, delta, status
+from tests.server.obstacle_messages import ORIGIN, alert, delta, status
 
 
 class Clock:
@@ -186,3 +194,81 @@ def test_alerts_of_a_node_that_was_started_anew_at_once_end() -> None:
         ended += watch.tick()
     assert ended == ["radar-1"]
     assert [doc.over for doc in watch.state.alerts] == [True]
+
+
+CRANE = [(4, 0, 20)]
+
+
+def test_a_map_that_begins_anew_in_flight_is_said_and_what_it_had_seen_counts_until_the_landing() -> None:
+    async def scenario() -> None:
+        watch, told, _ = watching()
+        await watch.on_flight(flies=True)
+        await watch.on_map(delta(CRANE, whole=True, began_mono_s=1.0))
+        assert not watch.state.alerts
+        await watch.on_map(delta([], whole=True, revision=0, began_mono_s=2.0))
+        (began,) = [each.alert for each in watch.state.alerts]
+        assert began.text.startswith("The radar map began anew: what it had seen counts")
+        assert sum(len(voxels.keys) for voxels in await seen_maps(watch)) == 1
+        await watch.on_flight(flies=False)
+        assert [message.alert.text for message in told if message.type == "alert"][-1].startswith("Nothing that")
+        assert sum(len(voxels.keys) for voxels in await seen_maps(watch)) == 0
+
+    asyncio.run(scenario())
+
+
+def test_a_map_that_is_just_being_told_is_waited_for_but_not_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    async def scenario() -> None:
+        watch, _, clock = watching()
+        await watch.on_map(delta(CRANE, whole=True, parts=2))
+        looking = asyncio.ensure_future(seen_maps(watch))
+        await watch.on_map(delta([(5, 0, 20)], whole=True, part=1, parts=2))
+        (seen,) = await looking
+        assert len(seen.keys) == 2
+        await watch.on_map(delta(CRANE, whole=True, parts=2, revision=2))
+        monkeypatch.setattr("server.obstacles.surroundings.COMES_WITHIN_S", 0.0)
+        with pytest.raises(NotReadyError, match="Parts of the radar map have been missing"):
+            await seen_maps(watch)
+        watch.on_status(status())
+        assert not watch.needs_whole["radar"].is_set(), "the rest may be on its way"
+        clock.now_s += LATE_S + 0.1
+        watch.on_status(status())
+        assert watch.needs_whole["radar"].is_set()
+
+    asyncio.run(scenario())
+
+
+def test_what_could_not_be_kept_leaves_the_way_unknown() -> None:
+    async def scenario() -> None:
+        watch, _, _ = watching()
+        await watch.on_flight(flies=True)
+        for number in range(MOST_GRIDS + 2):
+            origin = replace(ORIGIN, alt_amsl_m=float(number))
+            await watch.on_map(delta(CRANE, whole=True, origin=origin))
+        with pytest.raises(NotReadyError, match="not all that it had seen could be kept") as refused:
+            await seen_maps(watch)
+        assert "steer clear" in refused.value.advice
+
+    asyncio.run(scenario())
+
+
+def test_a_node_that_is_started_again_loses_nothing_and_a_local_map_that_is_laid_anew_keeps_nothing() -> None:
+    async def scenario() -> None:
+        watch, _, _ = watching()
+        await watch.on_flight(flies=True)
+
+        async def tells(teller: ChangeTeller, the_map: VoxelMap, t_mono_s: float, *points: tuple[float, ...]) -> None:
+            known = np.zeros(len(points), np.bool_)
+            the_map.insert(np.array(points), origin_enu=np.zeros(3), max_range_m=50.0, explained=known)
+            for part in teller.changes(the_map, ORIGIN, t_mono_s):
+                await watch.on_map(part)
+
+        teller, the_map = ChangeTeller("radar", 0.0), VoxelMap(resolution_m=1.0)
+        for t_mono_s in (10.0, 11.0, 12.0):
+            await tells(teller, the_map, t_mono_s, (4.5, 0.5, 20.5))
+        the_map.clear()
+        await tells(teller, the_map, 13.0, (8.5, 0.5, 20.5))
+        assert [voxels.keys.tolist() for voxels in await seen_maps(watch)] == [[[8, 0, 20]]]
+        await tells(ChangeTeller("radar", 0.0), VoxelMap(resolution_m=1.0), 14.0, (1.5, 0.5, 3.5))
+        assert [voxels.keys.tolist() for voxels in await seen_maps(watch)] == [[[1, 0, 3]], [[8, 0, 20]]]
+
+    asyncio.run(scenario())

@@ -191,7 +191,7 @@ def test_what_is_seen_during_the_upload_counts(play: Play, monkeypatch: pytest.M
     async def scenario(bench: Bench) -> None:
         looked: list[int] = []
 
-        def maps(_: Any) -> tuple[Any, ...]:
+        async def maps(_: Any) -> tuple[Any, ...]:
             looked.append(len([request for request in bench.vehicle.told if isinstance(request, Pause)]))
             return ()
 

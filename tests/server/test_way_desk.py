@@ -9,7 +9,6 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from planning.errors import ParameterError
@@ -19,7 +18,7 @@ from server.errors import CheckNeededError, ConflictError, NotCertifiedError, No
 from server.flying.in_flight.way_desk import WayDesk, flown_places
 from server.flying.in_flight.way_task import WayJudged, wish_of
 from server.heard.channel import Channel, ShownWay
-from server.scene.mirror import Voxels
+from server.scene.mirror import MapMirror
 from server.schemas import FenceDoc, FlyWayBody, GuidedState, PlaceDoc, WayBody, WayDoc, WaySpeedBody
 from server.schemas.flight_docs import CHECK_FRESH_S
 from server.work.jobs import Lane
@@ -31,6 +30,7 @@ from telemetry.topics.requests import FlyWay, SetSpeed, StartGuided
 from telemetry.topics.vehicle import VehicleState
 from tests.server.fakes import Told
 from tests.server.flying_desk_bench import ME, Made, Vehicle
+from tests.server.obstacle_messages import delta
 
 pytestmark = pytest.mark.xdist_group("flying-desk")
 
@@ -44,7 +44,7 @@ class Bench:
         me: Any = self
         self.live = Channel("live", Told())
         self.hovers(made.standing(), up_m)
-        self.mirrors: dict[str, Any] = {name: SimpleNamespace(origin=None) for name in SENSORS}
+        self.mirrors = {name: MapMirror(name) for name in SENSORS}
         self.desk = WayDesk(me.vehicle, self.live, me, made.library, lane, me, me)
 
     def publish(self, message: Any) -> None:
@@ -176,12 +176,15 @@ def test_what_a_sensor_has_seen_is_in_the_model_that_is_judged(made: Made, lane:
         assert state is not None
         assert state.home_alt_amsl_m is not None
         origin = MapOrigin(*made.home, state.home_alt_amsl_m)
-        wall = np.array([(15, north, 34) for north in range(-20, 20)], np.int32)
-        none, sure = np.zeros(len(wall), bool), np.full(len(wall), 250, np.uint8)
-        seen = Voxels(wall, sure, none, 1.0, origin, SENSORS[0])
-        bench.mirrors[SENSORS[0]] = SimpleNamespace(origin=origin, voxels=lambda: seen)
+        wall = [(15, north, 34) for north in range(-20, 20)]
+        radar = bench.mirrors["radar"]
+        radar.on_flight(flies=True)
+        radar.fold(delta(wall, whole=True, origin=origin, began_mono_s=1.0))
         way = await bench.judged(action="to", place=bench.beside(30.0, 0.0), height_m=20.0)
         assert way.has_seen
+        radar.fold(delta([], whole=True, origin=origin, began_mono_s=2.0))
+        again = await bench.judged(action="to", place=bench.beside(30.0, 0.0), height_m=20.0)
+        assert (again.problem, again.length_m) == (way.problem, way.length_m), "the radar's node was started again"
         assert way.problem != free.problem or way.length_m > free.length_m + 5.0, "over the wall, or not at all"
         assert free.problem is None
 

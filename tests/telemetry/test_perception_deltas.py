@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mapping.voxels.map import VoxelMap
-from telemetry.perception.map_changes import ChangeTeller, told_probability
+from telemetry.perception.map_changes import LEAST_APART_S, ChangeTeller, told_probability
 from telemetry.topics import deltas as d
 from telemetry.topics.deltas import FoldedMap, in_parts
 from telemetry.topics.obstacles import MapDelta, MapOrigin
@@ -72,11 +72,16 @@ def test_what_is_told_adds_up_to_the_map() -> None:
         np.testing.assert_array_equal(occupied.probability, told_probability(the_map.probability(centres)))
         np.testing.assert_array_equal(occupied.explained, the_map.explained(centres))
         assert told[0].whole == (step in (0, 6, 9))
+        began_s = 9.0 if step >= 9 else LEAST_APART_S
+        assert {part.began_mono_s for part in told} == {began_s}, "the one that was emptied is the same map"
         assert told[0].whole or before is None or told[0].since == before.revision
     assert teller.changes(the_map, ORIGIN, 20.0) == []
     assert teller.changes(the_map, None, 20.0) == []
     teller.forget()
-    assert teller.changes(the_map, ORIGIN, 20.0)[0].whole
+    again = teller.changes(the_map, ORIGIN, 20.0)[0]
+    assert (again.whole, again.began_mono_s) == (True, 9.0), "the same map, told again"
+    another = VoxelMap(resolution_m=0.5)
+    assert teller.changes(another, ORIGIN, 9.0)[0].began_mono_s > 9.0
 
 
 def test_occupied_is_above_one_half_and_nothing_else() -> None:

@@ -64,7 +64,7 @@ class _Judged:
     home: HomePlace
     at_deg: tuple[float, float]
     doc: ReturnDoc
-    maps: tuple[tuple[str, int, int], ...]
+    maps: tuple[int, ...]
     """Revision of the maps, before they were looked into."""
     took_s: float
 

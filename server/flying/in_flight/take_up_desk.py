@@ -162,7 +162,7 @@ class TakingUp:
             await self._link.call(ReadParameters(NAMES["px4" if state.autopilot == "px4" else "ardupilot"])),
             places,
             self._before.places or places,
-            await asyncio.to_thread(seen_maps, self._watch),
+            await seen_maps(self._watch),
             home_of_takeoff(self._live.track.states),
         )
         asked = replace(asked, state=self._state(), now_mono_s=time.monotonic())
@@ -179,7 +179,7 @@ class TakingUp:
 
     async def certificate(self, operator: Operator, asked: AskedTakeUp, onboard: OnboardMission) -> str:
         """Of what was read back, as JSON."""
-        aboard, maps = await self._places(operator), await asyncio.to_thread(seen_maps, self._watch)
+        aboard, maps = await self._places(operator), await seen_maps(self._watch)
         now = replace(asked, state=self._state(), now_mono_s=time.monotonic(), aboard=aboard, maps=maps)
         self._certified_home = home_of(now.state)
         return await self._lane.call(check_take_up, now, onboard)

@@ -166,7 +166,7 @@ class WayDesk:
         parameters = await self._link.call(ReadParameters(NAMES["px4" if state.autopilot == "px4" else "ardupilot"]))
         fence = await self._link.call(DownloadPlaces(operator, "fence"))
         rally = await self._link.call(DownloadPlaces(operator, "rally"))
-        maps = await asyncio.to_thread(seen_maps, self._watch)
+        maps = await seen_maps(self._watch)
         return WayAsked(
             body,
             self._library.terrain_dir(terrain.id),
@@ -186,7 +186,7 @@ class WayDesk:
             asked,
             terrain=self._library.terrain_dir(self._terrain().id),
             document=self._workspace.document,
-            maps=await asyncio.to_thread(seen_maps, self._watch),
+            maps=await seen_maps(self._watch),
             state=self._vehicle(),
             now_mono_s=time.monotonic(),
             flown=flown_places(self._live.track.states),
@@ -194,13 +194,14 @@ class WayDesk:
         )
 
     @property
-    def maps_revision(self) -> tuple[tuple[str, int, int], ...]:
+    def maps_revision(self) -> tuple[int, ...]:
         """Another one: what sensors have seen may be another."""
         return maps_revision(self._watch)
 
     async def has_seen_other(self, asked: WayAsked) -> bool:
         """Whether sensors have seen other things by now than ``asked`` is judged by."""
-        return not await asyncio.to_thread(lambda: is_same_seen(asked.maps, seen_maps(self._watch)))
+        seen = await seen_maps(self._watch)
+        return not await asyncio.to_thread(is_same_seen, asked.maps, seen)
 
     # How
 
