@@ -161,7 +161,7 @@ class Flying:
         )
         self.ways = WayDesk(link, self.live, workspace, library, lane, self._watch, present)
         self.home = HomeDesk(
-            link, self.live, self.ways, lane, present, lease.server_operator, self.desk.on_home_set, self._on_text
+            link, self.live, self.ways, lane, present, lease.server_operator, self.desk.on_home_set, bus
         )
         name = "" if alone else wanted.name
         self.parameters = ParameterDesk(link, self.live, aboard, library.root, self._on_parameters, name)

@@ -6,6 +6,8 @@ import asyncio
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -20,8 +22,10 @@ from server.scene.mirror import MapMirror
 from server.schemas import HomeAskedDoc, HomeBody, HomeState, ReturnDoc, SetHomeBody
 from server.schemas.flight_docs import CHECK_FRESH_S
 from server.work.jobs import Lane
+from telemetry.bus.bus import Bus
 from telemetry.errors import NotAllowedError
 from telemetry.flight.home_watch import home_of
+from telemetry.topics.messages import Topic, VehicleText
 from telemetry.topics.obstacles import SENSORS, MapOrigin
 from telemetry.topics.requests import SetHome
 from telemetry.topics.vehicle import VehicleState
@@ -39,7 +43,7 @@ LONG_S = 600.0
 class Bench:
     """A vehicle that took off at the plan's home and hovers 30 m above it."""
 
-    def __init__(self, made: Made, lane: Lane, *, up_m: float = 30.0) -> None:
+    def __init__(self, made: Made, lane: Lane, *, up_m: float = 30.0, bus: Any = None) -> None:
         self.made, self.vehicle, self.document = made, Vehicle(), made.document
         self.told: list[HomeState] = []
         me: Any = self
@@ -54,9 +58,12 @@ class Bench:
         ways = WayDesk(me.vehicle, self.live, me, made.library, lane, me, Told())
         self.sets = 0
         self.said: list[str] = []
-        self.desk = HomeDesk(
-            me.vehicle, self.live, ways, lane, me, lambda: ME, self.home_set, lambda text: self.said.append(text.text)
-        )
+        on: Any = bus or SimpleNamespace(publish=self.hears)
+        self.desk = HomeDesk(me.vehicle, self.live, ways, lane, me, lambda: ME, self.home_set, on)
+
+    def hears(self, topic: Topic, text: VehicleText) -> None:
+        assert (topic, text.severity) == (Topic.TEXT, home_desk.CRITICAL)
+        self.said.append(text.text)
 
     def home_set(self) -> None:
         self.sets += 1
@@ -280,7 +287,7 @@ def test_a_certified_return_is_judged_again_where_sensors_see_something_in_its_w
             assert second.state == "not_certified"
             assert second.judged_mono_s > first.judged_mono_s
             (said,) = bench.said
-            assert said.startswith("The vehicle's return was certified, and is not any more: ")
+            assert said.startswith("Ground station: the vehicle's return was certified, and is not any more: ")
             assert second.reasons[0].text in said
             # The radar's node is started again: its map is empty, and the mast stands where it stood.
             radar.fold(delta([], whole=True, revision=0, origin=origin, resolution_m=1.0, began_mono_s=50.0))
@@ -346,5 +353,27 @@ def test_what_nobody_foresaw_leaves_the_return_unknown_and_the_server_running(
             assert not judging.done()
         finally:
             judging.cancel()
+
+    runner.run(scenario())
+
+
+def test_what_the_station_says_of_the_return_is_on_the_bus_for_the_recorder_and_the_pages(
+    made: Made, lane: Lane, runner: asyncio.Runner, tmp_path: Path
+) -> None:
+    async def scenario() -> None:
+        server, recorder = await Bus.open(tmp_path, "server"), await Bus.open(tmp_path, "recorder")
+        try:
+            heard = [bus.subscribe(Topic.TEXT, keep_all=True) for bus in (server, recorder)]
+            bench = Bench(made, lane, bus=server)
+            bench.desk._holds = True
+            bench.desk._say_if_lost(ReturnDoc(state="not_certified", reasons=[], judged_mono_s=0.0))
+            async with asyncio.timeout(60.0):
+                for subscription in heard:
+                    _, message = await anext(aiter(subscription))
+                    assert isinstance(message, VehicleText)
+                    assert message.text == f"{home_desk.NO_MORE}."
+        finally:
+            await server.close()
+            await recorder.close()
 
     runner.run(scenario())

@@ -32,10 +32,11 @@ from server.schemas import (
 )
 from server.schemas.flight_docs import CHECK_FRESH_S
 from server.work.jobs import Lane
+from telemetry.bus.bus import Bus
 from telemetry.bus.link_client import LinkClient
 from telemetry.flight.home_watch import HomePlace, home_of, home_of_takeoff, is_there
 from telemetry.mavlink.believing import is_in_the_air
-from telemetry.topics.messages import VehicleText
+from telemetry.topics.messages import Topic, VehicleText
 from telemetry.topics.requests import Operator, SetHome
 from telemetry.topics.vehicle import VehicleState
 
@@ -52,7 +53,8 @@ NEW_MAP_S, PAUSE_SHARE = 5.0, 3.0
 takes have passed: what looks all the time keeps no processor busy all the time."""
 CRITICAL = 2
 """MAV_SEVERITY"""
-NO_MORE = "The vehicle's return was certified, and is not any more"
+NO_MORE = "Ground station: the vehicle's return was certified, and is not any more"
+"""It stands among what the vehicle says."""
 HOME_MOVED_AGAIN = "Home has moved again."
 LOOK_EVERY_S = 1.0
 
@@ -81,12 +83,12 @@ class HomeDesk:
         pages: Pages,
         server: Callable[[], Operator],
         home_set: Callable[[], None],
-        say: Callable[[VehicleText], None],
+        bus: Bus,
     ) -> None:
         """``ways``: gathers what is judged by; ``server``: in whose name it is asked for without a pilot; ``home_set``:
-        home was, or may have been, set by order; ``say``: to all pages, at once."""
+        home was, or may have been, set by order; ``bus``: what is said there is recorded, and told to all pages."""
         self._link, self._live, self._ways, self._lane, self._pages = link, live, ways, lane, pages
-        self._server, self._home_set, self._say = server, home_set, say
+        self._server, self._home_set, self._bus = server, home_set, bus
         self._asked: HomeAskedDoc | None = None
         self._asked_mono_s = 0.0
         self._is_judging = self._is_judging_return = False
@@ -289,7 +291,7 @@ class HomeDesk:
         first = doc.reasons[0] if doc.reasons else None
         why = "." if first is None else f": {first.text} {first.mend}".rstrip()
         instead = " A way home is certified: Guided flight, Home." if doc.instead else ""
-        self._say(VehicleText(time.time(), CRITICAL, f"{NO_MORE}{why}{instead}"))
+        self._bus.publish(Topic.TEXT, VehicleText(time.time(), CRITICAL, f"{NO_MORE}{why}{instead}"))
 
     async def _judged_return(self) -> ReturnDoc:
         asked = self._gathered or await self._ways.asked(self._server(), ANYWHERE)
