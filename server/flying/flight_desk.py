@@ -277,11 +277,11 @@ class FlightDesk:
         found = await self._uploads.mission(operator, made.items, made.record, home, while_holding=True)
         async with self._taking_up.computing():
             self._set_busy("Certifying what is on board")
-            certificate_json = await self._taking_up.certificate(operator, asked, found)
+            certificate_json, certified_home = await self._taking_up.certificate(operator, asked, found)
         self._set_busy("Taking it up")
         self._aboard.certified(certificate_json)
         await self._uploads.note()  # before: what fails here leaves it not taken up
-        await self._taking_up.begin(operator, found.digest, made)
+        await self._taking_up.begin(operator, found.digest, made, certified_home)
 
     async def _checked(
         self, operator: Operator, state: VehicleState, *, rereferenced_m: float | None = None

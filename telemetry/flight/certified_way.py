@@ -22,6 +22,7 @@ from planning.terrain.holes import fill_holes
 from telemetry.errors import NotAllowedError
 from telemetry.flight.guided.handover import is_fresh
 from telemetry.flight.guided.script_targets import bearing_rad
+from telemetry.flight.home_watch import home_of
 from telemetry.flight.preflight.checks import STEEP_ENOUGH, accuracy_m, gnss_row
 from telemetry.flight.preflight.parameters import return_settings
 from telemetry.flight.preflight.preflight import actual_home
@@ -59,8 +60,8 @@ def here_of(state: VehicleState, wish: Wish, now_s: float) -> Here:
     home, lat_deg, lon_deg, up_m = actual_home(state, None), state.lat_deg, state.lon_deg, state.alt_rel_home_m
     if home is None or lat_deg is None or lon_deg is None or up_m is None or not is_fresh(state, now_s):
         raise NotAllowedError("Where the vehicle is now is not known.", advice="Wait for its position.")
-    if flies and (state.home_lat_deg is None or state.home_lon_deg is None):
-        raise NotAllowedError("The vehicle does not tell its home: its height is not known.", advice="Wait for it.")
+    if flies and home_of(state) is None:
+        raise _homeless()
     return Here((lat_deg, lon_deg), 0.0 if isinstance(wish, TakeOff) else up_m, (home.lat_deg, home.lon_deg))
 
 
@@ -159,7 +160,10 @@ def _at_worse_end(flown: Flown) -> ClearanceParams:
 def way_request(
     operator: Operator, way: GuidedWay, wish: Wish, home: HomePlace | None, *, speed_m_s: float, most_m_s: float
 ) -> StartGuided | FlyWay:
-    """What flies a way that may be flown, from the ``home`` that it was judged for."""
+    """What flies a way that may be flown, from the ``home`` that it was judged for: the link refuses it for another.
+
+    Raises NotAllowedError without one, unless it is a take-off, before which the vehicle takes its home.
+    """
     targets = tuple(
         GuidedTarget(NO_ITEM, lat_deg, lon_deg, up_m, speed_m_s, heading_rad=_heading(wish, (lat_deg, lon_deg)))
         for lat_deg, lon_deg, up_m in way.places[1:]
@@ -169,8 +173,15 @@ def way_request(
         lat_deg, lon_deg, _ = way.places[0]
         begins, up_m = {"begins_lat_deg": lat_deg, "begins_lon_deg": lon_deg}, way.places[-1][2]
         return StartGuided(operator, targets, up_m, end="hold", spare_m=spare_m, **begins)
+    if home is None:
+        raise _homeless()
     end = "land" if isinstance(wish, RETURNS) else "hold"
     return FlyWay(operator, targets, *way.places[0], most_m_s, end=end, spare_m=spare_m, home=home)
+
+
+def _homeless() -> NotAllowedError:
+    what = "The vehicle does not tell its home, place and height: no way can be certified for it."
+    return NotAllowedError(what, where="home", advice="Wait for it.")
 
 
 def _heading(wish: Wish, at_deg: tuple[float, float]) -> float | None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +17,8 @@ from planning.fence.fence_model import Fence, circle
 from planning.formats.fence_files import write_fence
 from planning.terrain.dsm import Dsm
 from planning.terrain.geotiff import write_dsm
+from server.cli.flights.goto_command import _placed
+from telemetry.topics.vehicle import VehicleState
 from tests.server.cli_runs import Run, hedgehop
 from tests.server.simulated import QUICKLY_DOWN, simulated_vehicle
 
@@ -56,6 +60,16 @@ def link() -> Iterator[str]:
 
 def goto(link: str, dsm: Path, *arguments: object) -> Run:
     return hedgehop("goto", link, *arguments, "--dsm", dsm, *QUICK, "--json")
+
+
+@pytest.mark.parametrize("missing", ["home_lat_deg", "home_lon_deg", "home_alt_amsl_m"])
+def test_in_flight_a_whole_home_is_waited_for(missing: str) -> None:
+    home: dict[str, Any] = {"home_lat_deg": 37.0, "home_lon_deg": 15.0, "home_alt_amsl_m": 100.0}
+    flies = VehicleState(1, 1, armed=True, lat_deg=37.0, lon_deg=15.0, alt_rel_home_m=10.0, **home)
+    missing_one: dict[str, Any] = {missing: None}
+    assert _placed(flies) is flies
+    assert _placed(replace(flies, **missing_one)) is None
+    assert _placed(replace(flies, armed=False, **missing_one)) is not None, "it takes its home when it arms"
 
 
 def test_up_over_the_wall_and_home(link: str, dsm: Path) -> None:

@@ -13,10 +13,12 @@ import pytest
 
 from planning.fence.fence_model import Fence, circle
 from planning.formats.fence_items import fence_items
-from server.errors import StorageError
+from server.errors import ConflictError, JobCancelledError, NotReadyError, StorageError
+from server.flying.in_flight.take_up_desk import TakingUp
 from server.schemas import FenceDoc, RallyDoc, TakeUpPlan
 from server.work.jobs import Lane
 from telemetry.errors import NotAllowedError, TransferError
+from telemetry.flight.home_watch import home_of
 from telemetry.mavlink.items import wire_items
 from telemetry.mavlink.verify import as_stored
 from telemetry.topics.messages import FlightStatus, LinkStatus
@@ -198,5 +200,96 @@ def test_what_is_seen_during_the_upload_counts(play: Play, monkeypatch: pytest.M
         monkeypatch.setattr("server.flying.in_flight.take_up_desk.seen_maps", maps)
         await bench.desk.take_up(ME, AGAIN)
         assert looked == [1, 1], "before it is made, and when it was read back"
+
+    play(scenario)
+
+
+def desk() -> TakingUp:
+    """Of which only what is computed is looked at."""
+    nothing: Any = None
+    return TakingUp(nothing, nothing, nothing, nothing, nothing, nothing, nothing)
+
+
+def test_a_cancel_that_comes_with_the_answer_is_kept_and_one_that_comes_twice_does_nothing() -> None:
+    async def scenario() -> None:
+        taking = desk()
+
+        async def is_done() -> None:
+            async with taking.computing():
+                taking.cancel()  # the answer is here already: nothing is awaited any more
+                taking.cancel()
+
+        with pytest.raises(JobCancelledError):
+            await is_done()
+        unwinding = asyncio.Event()
+
+        async def computes() -> None:
+            async with taking.computing():
+                try:
+                    await asyncio.Event().wait()
+                finally:
+                    unwinding.set()
+                    await asyncio.sleep(0)
+
+        computing = asyncio.ensure_future(computes())
+        await asyncio.sleep(0)
+        taking.cancel()
+        await unwinding.wait()
+        taking.cancel()
+        with pytest.raises(JobCancelledError):
+            await computing
+        with pytest.raises(ConflictError, match="Nothing is being computed"):
+            taking.cancel()
+        async with taking.computing():
+            pass  # the next try knows nothing of it
+
+    asyncio.run(scenario())
+
+
+def test_somebody_elses_time_limit_is_not_told_as_a_cancel() -> None:
+    async def scenario() -> None:
+        taking = desk()
+        with pytest.raises(TimeoutError, match="of the bus"):
+            async with taking.computing():
+                raise TimeoutError("of the bus")
+        assert not taking.is_computing
+
+    asyncio.run(scenario())
+
+
+def test_what_is_on_board_is_not_taken_up_for_a_home_that_nobody_told(
+    play: Play, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scenario(bench: Bench) -> None:
+        certifies = TakingUp.certificate
+
+        async def loses_home(taking: TakingUp, *args: Any) -> Any:
+            assert bench.live.state is not None
+            bench.live.state = replace(bench.live.state, home_alt_amsl_m=None)
+            return await certifies(taking, *args)
+
+        monkeypatch.setattr(TakingUp, "certificate", loses_home)
+        with pytest.raises(NotReadyError, match="does not tell its home whole"):
+            await bench.desk.take_up(ME, AGAIN)
+        assert TakeUp not in map(type, bench.vehicle.told)
+
+    play(scenario)
+
+
+def test_what_the_link_says_meanwhile_does_not_take_away_the_home_that_was_certified(
+    play: Play, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scenario(bench: Bench) -> None:
+        notes = bench.desk._uploads.note
+
+        async def noted() -> None:
+            bench.desk._taking_up.forget()  # as where another vehicle is adopted, or the mission is flown
+            await notes()
+
+        monkeypatch.setattr(bench.desk._uploads, "note", noted)
+        await bench.desk.take_up(ME, AGAIN)
+        (sent,) = [request for request in bench.vehicle.told if isinstance(request, TakeUp)]
+        assert sent.home is not None
+        assert sent.home == home_of(bench.live.state)
 
     play(scenario)

@@ -8,7 +8,10 @@ import pytest
 
 from planning.basics.plan_model import ANY_VEHICLE
 from planning.guided.guided_model import GoTo, GuidedWay, ToHome, Wish
-from telemetry.flight.certified_way import Flown, judged_way
+from telemetry.errors import NotAllowedError
+from telemetry.flight.certified_way import Flown, judged_way, way_request
+from telemetry.flight.home_watch import HomePlace
+from telemetry.topics.requests import FlyWay, Operator
 from telemetry.topics.vehicle import VehicleState
 from tests.planning.test_guided_ways import CLEARANCE, HOME, at, flat, model
 
@@ -25,6 +28,7 @@ def judged(wish: Wish, parameters: dict[str, float | None], **more: Any) -> Guid
         "heartbeat_t_mono_s": 0.0,
         "gnss_fix": "rtk_fixed",
     }
+    places["home_alt_amsl_m"] = 100.0
     flies: dict[str, Any] = {"autopilot": "ardupilot", "armed": True, "landed": "in_air", "alt_rel_home_m": 12.0}
     state = VehicleState(1, 1, **(places | heard | flies | more))
     flown = Flown(ANY_VEHICLE, CLEARANCE, parameters)
@@ -53,3 +57,20 @@ def test_a_return_that_is_not_known_is_not_certified_but_may_be_accepted(
     assert not way.certificate.certified
     assert words in way.reasons[-1]
     assert judged(ToHome(9.0), parameters).problem is None, "a certified way home does not need the vehicle's own"
+
+
+@pytest.mark.parametrize("missing", ["home_lat_deg", "home_lon_deg", "home_alt_amsl_m"])
+def test_without_a_whole_home_nothing_is_certified_that_the_link_could_not_hold_against_it(missing: str) -> None:
+    with pytest.raises(NotAllowedError, match="does not tell its home, place and height") as refused:
+        judged(GoTo(9.0), TOLD, **{missing: None})
+    assert refused.value.advice == "Wait for it."
+
+
+def test_no_way_is_asked_of_the_link_without_the_home_that_it_was_judged_for() -> None:
+    me, wish, home = Operator("console", 1), GoTo(9.0), HomePlace(37.0, 15.0, 100.0)
+    way = judged(wish, TOLD)
+    with pytest.raises(NotAllowedError, match="does not tell its home"):
+        way_request(me, way, wish, None, speed_m_s=1.0, most_m_s=2.0)
+    request = way_request(me, way, wish, home, speed_m_s=1.0, most_m_s=2.0)
+    assert isinstance(request, FlyWay)
+    assert request.home == home

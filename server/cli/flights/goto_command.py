@@ -263,10 +263,10 @@ def _ended(flight: FlightStatus, since_utc_s: float, *, lands: bool | None) -> F
 
 
 def _placed(state: VehicleState | None) -> VehicleState | None:
-    """Once it tells where it is and where its home is."""
+    """Once it tells where it is and, in flight, where its home is and how high."""
     if state is None or None in (state.lat_deg, state.lon_deg, state.alt_rel_home_m):
         return None
-    return state if not state.armed or state.home_lat_deg is not None else None
+    return state if not state.armed or home_of(state) is not None else None
 
 
 def _tell(watch: Watch) -> None:

@@ -76,12 +76,12 @@ class TakingUp:
         self._lane, self._watch, self._aboard = lane, watch, aboard
         self._until: asyncio.Timeout | None = None
         """Of what is being computed; None: nothing is."""
+        self._is_cancelled = False
         self.forget()
 
     def forget(self) -> None:
         """Another flight, or what is on board is flown: no try that failed counts any more."""
         self._before: Before | None = None
-        self._certified_home: HomePlace | None = None
         self._sent: Literal["nothing", "mission", "places"] = "nothing"
 
     @property
@@ -90,20 +90,28 @@ class TakingUp:
 
     @contextlib.asynccontextmanager
     async def computing(self) -> AsyncIterator[None]:
-        """``cancel`` ends what is done in it, and the process that does it, with JobCancelledError."""
+        """``cancel`` ends what is done in it, and the process that does it, with JobCancelledError: also where all was
+        done already, so that nothing is sent that was cancelled."""
+        self._is_cancelled = False
         try:
             async with asyncio.timeout(None) as self._until:
                 yield
         except TimeoutError:
-            raise JobCancelledError("Taking up the plan was cancelled.") from None
+            if not self._is_cancelled:
+                raise
         finally:
             self._until = None
+        if self._is_cancelled:
+            raise JobCancelledError("Taking up the plan was cancelled.")
 
     def cancel(self) -> None:
         """Raises ConflictError where nothing is being computed: what was sent to the vehicle is not called back."""
         if self._until is None:
             what = "Nothing is being computed that could be cancelled."
             raise ConflictError(what, advice="See what is on board; return home or land at any time.")
+        if self._is_cancelled:
+            return  # it is being ended
+        self._is_cancelled = True
         self._until.reschedule(asyncio.get_running_loop().time())
 
     def check_flies(self) -> None:
@@ -166,10 +174,13 @@ class TakingUp:
             home_of_takeoff(self._live.track.states),
         )
         asked = replace(asked, state=self._state(), now_mono_s=time.monotonic())
+        limit = asyncio.timeout(FOUND_WITHIN_S)
         try:
-            async with asyncio.timeout(FOUND_WITHIN_S):
+            async with limit:
                 made = await self._workspace.plan_lane.call(make_take_up, asked, progress=lambda step, _: tell(step))
         except TimeoutError:
+            if not limit.expired():
+                raise
             what = f"No way into the plan was found within {FOUND_WITHIN_S:.0f} s."
             raise NotReadyError(what, advice="Plan fewer points, or a smaller position error.") from None
         battery = made.doc.battery
@@ -177,15 +188,20 @@ class TakingUp:
             raise NotAllowedError(battery.text, where="battery", advice=battery.mend)
         return asked, made
 
-    async def certificate(self, operator: Operator, asked: AskedTakeUp, onboard: OnboardMission) -> str:
-        """Of what was read back, as JSON."""
+    async def certificate(
+        self, operator: Operator, asked: AskedTakeUp, onboard: OnboardMission
+    ) -> tuple[str, HomePlace]:
+        """Of what was read back, as JSON, and the home that it holds for."""
         aboard, maps = await self._places(operator), await seen_maps(self._watch)
         now = replace(asked, state=self._state(), now_mono_s=time.monotonic(), aboard=aboard, maps=maps)
-        self._certified_home = home_of(now.state)
-        return await self._lane.call(check_take_up, now, onboard)
+        if (home := home_of(now.state)) is None:
+            what = "The vehicle does not tell its home whole: what is on board can be certified for none."
+            raise NotReadyError(what, where="home", advice="Wait for home, then take the plan up again.")
+        return await self._lane.call(check_take_up, now, onboard), home
 
-    async def begin(self, operator: Operator, digest: str, made: MadeTakeUp) -> None:
-        await self._link.call(TakeUp(operator, digest, *made.begins, self._certified_home))
+    async def begin(self, operator: Operator, digest: str, made: MadeTakeUp, home: HomePlace) -> None:
+        """``home``: that it was certified for; the link refuses it for another one."""
+        await self._link.call(TakeUp(operator, digest, *made.begins, home))
         self.forget()
 
     async def what_is_aboard(self, operator: Operator) -> str:
