@@ -9,7 +9,7 @@ from typing import Literal
 
 from telemetry.errors import MissionUnknownError, NotAllowedError
 from telemetry.flight.avoidance.fence_aboard import FenceAboard
-from telemetry.flight.guided.beginning import why_not_from
+from telemetry.flight.guided.beginning import Steady, why_not_from, why_not_gone_on
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.autopilot_orders import MISSION_MODES
 from telemetry.topics.onboard_lists import OnboardMission
@@ -158,11 +158,12 @@ class UnderWay:
 
     def __init__(self, onboard: OnBoard) -> None:
         self._onboard, self.started = onboard, Started()
+        self._steady = Steady()
         self._is_inherited = self._known_foreign = False
         """Of a link node before this one, and not held against what is on board yet. The alarm has been raised."""
 
     def begin(self, digest: str | None, begins: TakeUp | None = None) -> None:
-        self.started, self._is_inherited = Started(digest, begins), False
+        self.started, self._is_inherited, self._steady = Started(digest, begins), False, Steady()
 
     def inherit(self, started: Started) -> None:
         self.started, self._is_inherited = started, True
@@ -217,7 +218,10 @@ class UnderWay:
         if self.started.digest is not None:
             check_same_mission(self._onboard, self.started.digest)
         if self.started.begins is not None:
-            check_begins(self.started.begins, state)
+            now_s = time.monotonic()
+            refusal = self._steady.shown(why_not_gone_on(self.started.begins, state, now_s), now_s)
+            if refusal is not None:
+                raise refusal
 
     @property
     def why_foreign(self) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from telemetry.errors import MissionUnknownError, NotAllowedError
+from telemetry.flight.guided.beginning import CALM_S
 from telemetry.link.onboard import FOREIGN_MISSION, HOME_MOVED, NOT_TAKEN_UP, OnBoard, Started, UnderWay
 from telemetry.nodes.link import Memory, read_memory, write_memory
 from telemetry.topics.messages import FlightStatus
@@ -51,8 +53,40 @@ def test_a_taken_up_mission_begins_where_it_was_certified_also_after_another_mod
     flight = taken_up()
     flight.on_state(holding(mode=mode))
     flight.check_goes_on(holding())
-    with pytest.raises(NotAllowedError, match="from where the certified way begins"):
+    with pytest.raises(NotAllowedError, match="from where the certified way begins") as refused:
         flight.check_goes_on(holding(north_m=80.0))
+    assert refused.value.advice.startswith("Take the plan up again.")
+
+
+def test_gusts_change_what_is_said_of_a_plan_that_waits_seldom_and_let_it_go_on_once_it_is_calm(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    flight, now_s, said = taken_up(), 1000.0, list[tuple[float, str]]()
+
+    def check(**state: Any) -> None:
+        told = replace(holding(), position_t_mono_s=now_s, **state)
+        try:
+            flight.check_goes_on(told)
+            words = ""
+        except NotAllowedError as error:
+            words = str(error)
+        if not said or said[-1][1] != words:
+            said.append((now_s, words))
+
+    monkeypatch.setattr("telemetry.link.onboard.time.monotonic", lambda: now_s)
+    check()
+    for number in range(200):  # ten seconds of gusts, each another, at 20 Hz
+        now_s += 0.05
+        away = {"lat_deg": -37.0 + (1.0 + number / 100) / 111_000}
+        check(**{0: {"ground_speed_m_s": 1.0 + number / 50 + 0.01}, 1: {}, 2: away}[number % 3])
+    assert said[1][0] == pytest.approx(1000.05), "at once"
+    assert all(words and not any(c.isdigit() for c in words) for _, words in said[1:])
+    assert all(later - before >= CALM_S - 1e-6 for (before, _), (later, _) in pairwise(said[1:]))
+    calm_s = now_s
+    while said[-1][1]:
+        now_s += 0.05
+        check()
+    assert now_s - calm_s == pytest.approx(CALM_S, abs=0.11)
 
 
 def test_once_it_is_flown_it_is_gone_on_with_from_anywhere() -> None:

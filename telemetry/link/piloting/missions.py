@@ -17,7 +17,7 @@ from planning.basics.mav_cmd import MavCmd
 from planning.basics.plan_model import Firmware
 from planning.formats.commands import FLOWN_TO
 from telemetry.errors import MissionUnknownError, NotAllowedError, RefusedError, SilentError, TelemetryError
-from telemetry.flight.guided.beginning import why_moves
+from telemetry.flight.guided.beginning import PLAN_AGAIN, why_moves
 from telemetry.flight.guided.remaining_mission import RemainingMission, remaining_from
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.onboard import OnBoard, check_same_mission
@@ -159,7 +159,7 @@ def check_holds(state: VehicleState, *, is_led: bool) -> None:
         does = "being led past something" if is_led else f"in {state.mode}"
         what = f"The vehicle does not hold: it is {does}."
         raise NotAllowedError(what, advice="Hold first: what is on board is replaced only then.")
-    if (refusal := why_moves(state)) is not None:
+    if (refusal := why_moves(state, again=PLAN_AGAIN)) is not None:
         raise refusal
 
 
