@@ -112,7 +112,7 @@ def test_what_was_seen_is_planned_against_and_taken_out_again(flying: Station) -
     assert back.min_distance_m == pytest.approx(plain.min_distance_m)
 
 
-def test_a_killed_radar_leaves_the_camera_and_comes_back(flying: Station) -> None:
+def test_a_killed_radar_leaves_the_camera_and_comes_back_and_what_it_saw_counts(flying: Station) -> None:
     run = _runtime(flying)
     facts = running_node(run, "radar")
     assert facts is not None
@@ -127,7 +127,9 @@ def test_a_killed_radar_leaves_the_camera_and_comes_back(flying: Station) -> Non
         return len(seen) == 2
 
     flying.until(both, LONG_S)
-    flying.until(lambda m: m.type == "perception" and m.sensor == "radar" and m.status.frames < 100, LONG_S)
+    told = obstacles(flying, lambda state: any(each.alert.id.startswith("kept-radar") for each in state.alerts))
+    kept = next(each for each in told.alerts if each.alert.id.startswith("kept-radar"))
+    assert "what it had seen counts for ways and returns" in kept.alert.text
     again = running_node(run, "radar")
     assert again is not None
     assert again.pid != facts.pid
