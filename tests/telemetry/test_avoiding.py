@@ -192,6 +192,24 @@ def test_however_short_it_sees_it_brakes_for_what_it_sees() -> None:
     it.until(lambda: BRAKE in it.modes(), 120)
 
 
+@pytest.mark.parametrize("late_s", [0.6, 1.0, 1.5])
+@pytest.mark.parametrize(("sensor", "depth_m", "period_s"), [("radar", 10.0, 0.1), ("vision", 7.0, 0.2)])
+def test_frames_that_come_late_make_it_slower_and_stop_it_before_what_they_saw(
+    sensor: Any, depth_m: float, period_s: float, late_s: float
+) -> None:
+    it = craft(Wall(40, 15), senses=[Sense(sensor, depth_m, period_s, late_s=late_s)])
+    it.until(lambda: state(it) == "holding", 60)
+    it.advance(10.0)
+    assert state(it) == "holding", "what is seen late is not seen to be clear"
+    assert max(n for _, n, u in it.trail if u < 15.5) < 40.0 - 1.0
+    late = f"{sensor.capitalize()}: over 0.5 s late. It brakes that much later; end what else runs here."
+    assert late in it.texts
+    assert it.avoiding.status.text.startswith(f"Frames from {sensor} come over 0.5 s late. It climbs on by itself")
+    it.senses[0].late_s = 0.05
+    it.until(lambda: state(it) == "offset", 60)
+    assert max(n for _, n, u in it.trail if u < 15.5) < 40.0 - 0.6
+
+
 @pytest.mark.fact("A41")
 def test_a_way_home_that_is_too_fast_is_slowed() -> None:
     """RTL_SPEED 0: as fast as WPNAV_SPEED says, whatever the mission's own speed was."""

@@ -22,7 +22,7 @@ def status(t_s: float, **changes: Any) -> PerceptionStatus:
 def of(*said: PerceptionStatus) -> Regions:
     regions = Regions(PerceptionSettings())
     for each in said:
-        regions.take(each)
+        regions.take(each, each.t_mono_s)
     return regions
 
 
@@ -42,8 +42,8 @@ def test_what_is_in_the_region_is_in_the_way_until_several_fresh_frames_are_clea
     assert [sight.distance_m for sight in regions.occupied(1.1)] == [5.0]
     for k in range(1, CLEAR_FRAMES + 1):
         assert not regions.is_clear(vision, 1.0 + 0.1 * k)
-        regions.take(status(1.0 + 0.1 * k))
-        regions.take(status(1.0 + 0.1 * k))  # the same frame, told again
+        regions.take(status(1.0 + 0.1 * k), 1.0 + 0.1 * k)
+        regions.take(status(1.0 + 0.1 * k), 1.0 + 0.1 * k)  # the same frame, told again
     assert regions.is_clear(vision, 1.4)
     assert not regions.is_clear(vision, 2.4)
 
@@ -90,7 +90,7 @@ def test_what_cannot_be_seen_is_not_clear_however_many_frames_show_nothing() -> 
     assert not regions.is_clear(frozenset(), 2.9)
     assert regions.nearest_m(vision, 2.9) == 0.6
     for k in range(20, 20 + CLEAR_FRAMES):
-        regions.take(status(1.0 + 0.1 * k, frames=k))
+        regions.take(status(1.0 + 0.1 * k, frames=k), 1.0 + 0.1 * k)
     assert regions.is_clear(vision, 3.2)
 
 
@@ -104,7 +104,7 @@ def test_a_map_that_began_anew_has_forgotten_what_stood_there() -> None:
     regions = of(status(1.0, obstacles=(seen_at(5.0),), frames=50))
     regions.rely()
     for k in range(5):
-        regions.take(status(1.1 + 0.1 * k, frames=k))
+        regions.take(status(1.1 + 0.1 * k, frames=k), 1.1 + 0.1 * k)
     assert not regions.is_clear(vision, 1.5)
     assert regions.hidden(vision, 1.5) is not None
 
@@ -121,13 +121,32 @@ def test_how_fast_it_may_be_follows_from_what_each_sensor_sees_and_how_late() ->
     assert late[1] < speed_m_s - 0.2
 
 
+def test_a_late_frame_shows_what_is_in_the_way_for_two_seconds_and_nothing_to_be_clear() -> None:
+    regions, vision = Regions(PerceptionSettings()), frozenset[Sensor]({"vision"})
+    regions.take(status(1.0, obstacles=(seen_at(5.0),)), 1.9)
+    assert regions.counted(1.9) == ()
+    assert regions.seen_by(1.9) == vision
+    assert [eye.late_s(1.9) for eye in regions.eyes(1.9)] == [pytest.approx(0.9)]
+    in_time, late = of(status(1.0)).slowest(1.0), regions.slowest(1.9)
+    assert in_time is not None
+    assert late is not None
+    assert late[1] < in_time[1] - 0.5
+    assert regions.seen_by(3.1) == frozenset()
+    for k in range(1, 10):
+        regions.take(status(1.0 + 0.1 * k), 1.9 + 0.1 * k)
+    assert regions.seen_by(2.8) == frozenset(), "a newer frame does not show it"
+    assert not regions.is_clear(vision, 2.8)
+    assert regions.slowest(3.9) is None
+    assert regions.eyes(3.9) == []
+
+
 def test_what_is_told_of_a_refused_frame_says_nothing_about_the_region() -> None:
     regions = of(status(1.0, obstacles=(seen_at(5.0),)))
     for t_s in (1.1, 1.2, 1.3, 1.0, 50.0):  # the last one says that it is from the future
-        regions.take(status(t_s, region=None))
+        regions.take(status(t_s, region=None), 1.3)
     assert [sight.distance_m for sight in regions.occupied(1.4)] == [5.0]
     assert not regions.is_clear(frozenset({"vision"}), 1.4)
-    regions.take(status(1.4))
+    regions.take(status(1.4), 1.4)
     assert regions.sights["vision"].t_mono_s == 1.4
 
 

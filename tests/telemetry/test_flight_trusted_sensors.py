@@ -17,7 +17,7 @@ OLD = VehicleState(1, 1, position_t_mono_s=19.0)
 
 def who_saw(sensor: Sensor, t_s: float) -> TrustedSensors:
     regions = Regions(PerceptionSettings())
-    regions.take(PerceptionStatus(sensor, "running", "", t_s, 0.0, t_s, region=OCCUPIED))
+    regions.take(PerceptionStatus(sensor, "running", "", t_s, 0.0, t_s, region=OCCUPIED), t_s)
     trusted = TrustedSensors(regions)
     trusted.join(t_s)
     return trusted

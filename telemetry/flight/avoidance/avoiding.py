@@ -237,7 +237,7 @@ class Avoiding:
         return [*self._helm.on_state(state, now_s), *self._look(now_s)]
 
     def on_perception(self, status: PerceptionStatus, now_s: float) -> list[Action]:
-        self.regions.take(status)
+        self.regions.take(status, now_s)
         return self._look(now_s)
 
     def on_tracks(self, status: TracksStatus, now_s: float) -> list[Action]:

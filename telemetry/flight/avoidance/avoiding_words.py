@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from telemetry.flight.avoidance.detour import Detour
-from telemetry.flight.avoidance.regions import FASTER_M_S, SENSOR_WORDS, Regions, Sight
+from telemetry.flight.avoidance.regions import FASTER_M_S, OLD_S, SENSOR_WORDS, Regions, Sight
 from telemetry.topics.obstacles import AvoidanceStatus, AvoidBy, Eye
 
 
@@ -80,7 +80,7 @@ def _text(now: Now, regions: Regions, detour: Detour) -> str:
         if regions.eyes(now.t_s):
             return _fence_words(detour)
         return "No sensor sees ahead: nothing brakes by itself."
-    return _speed_words(now, *slowest) or _fence_words(detour)
+    return _speed_words(now, *slowest) or _late_words(now, regions) or _fence_words(detour)
 
 
 def _fence_words(detour: Detour) -> str:
@@ -96,6 +96,16 @@ def _speed_words(now: Now, sight: Sight, largest_m_s: float) -> str:
     if now.slowed_to_m_s is not None:
         return f"Slowed to {now.slowed_to_m_s:.1f} m/s: {sees}."
     return ""
+
+
+def _late_words(now: Now, regions: Regions) -> str:
+    late = [SENSOR_WORDS[sight.sensor] for sight in regions.eyes(now.t_s) if sight.late_s(now.t_s)]
+    who = " and ".join(late)
+    return (
+        f"{who.capitalize()}: over {OLD_S:g} s late. It brakes that much later; end what else runs here."
+        if late
+        else ""
+    )
 
 
 def _engaged_text(regions: Regions, detour: Detour, now_s: float) -> str:

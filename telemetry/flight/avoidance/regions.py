@@ -13,7 +13,9 @@ from telemetry.topics.obstacles import PerceptionSettings, PerceptionStatus, Sen
 
 SENSOR_WORDS: dict[Sensor, str] = {"radar": "radar", "vision": "vision", "ranges": "range sensors"}
 OLD_S = 0.5
-"""A frame or pose older than this says nothing about what is ahead now."""
+"""What a frame or pose older than this shows to be clear need not be so now."""
+LATE_S = 2.0
+"""What a frame saw in the way stands there until a newer one of that sensor comes, or it is older than this."""
 BLIND_S = 1.0
 """Without a frame for so long a sensor is no eye any more."""
 CLEAR_FRAMES = 3
@@ -38,6 +40,7 @@ class Sight:
 
     sensor: Sensor
     t_mono_s: float
+    came_mono_s: float
     counts: bool
     """It works: it is neither blind nor frozen nor waiting for its first frame."""
     flowed_t_mono_s: float
@@ -66,6 +69,15 @@ class Sight:
 
     def is_fresh(self, now_s: float) -> bool:
         return self.counts and now_s - self.t_mono_s <= OLD_S
+
+    def is_eye(self, now_s: float) -> bool:
+        """It works, and shows in time to be stopped for what is in the way, if not that nothing is."""
+        return self.counts and now_s - self.came_mono_s <= BLIND_S and now_s - self.t_mono_s <= LATE_S
+
+    def late_s(self, now_s: float) -> float:
+        """How late its frames come while they are too late to show that nothing is in the way; otherwise 0."""
+        late_s = self.came_mono_s - self.t_mono_s
+        return late_s if late_s > OLD_S and self.is_eye(now_s) else 0.0
 
 
 def largest_speed(sees_enough_for_m_s: float) -> float:
@@ -111,8 +123,8 @@ class Regions:
     def braking(self) -> Braking:
         return Braking(self.settings.brake_decel_m_s2, self.settings.brake_jerk_m_s3)
 
-    def take(self, status: PerceptionStatus) -> None:
-        """Frames that come late or twice change nothing, nor does one that was refused or does not look ahead."""
+    def take(self, status: PerceptionStatus, now_s: float) -> None:
+        """Frames out of order, or that come twice, change nothing, nor does one that was refused or looks elsewhere."""
         if status.state == "running" and status.region is None:
             return
         before = self.sights.get(status.sensor)
@@ -126,6 +138,7 @@ class Regions:
         self.sights[status.sensor] = Sight(
             sensor=status.sensor,
             t_mono_s=status.t_mono_s,
+            came_mono_s=before.came_mono_s if before is not None and again else now_s,
             counts=status.state == "running",
             flowed_t_mono_s=_flowed_t_s(status, before),
             why=status.text,
@@ -147,8 +160,8 @@ class Regions:
         return tuple(sight.sensor for sight in self.fresh(now_s))
 
     def occupied(self, now_s: float) -> tuple[Sight, ...]:
-        """Fresh sights with something in the way, nearest first."""
-        found = [sight for sight in self.fresh(now_s) if sight.occupied]
+        """Sights with something in the way, late ones as well, nearest first."""
+        found = [s for s in self.sights.values() if s.counts and s.occupied and now_s - s.t_mono_s <= LATE_S]
         return tuple(sorted(found, key=lambda sight: sight.distance_m or 0.0))
 
     def seen_by(self, now_s: float) -> frozenset[Sensor]:
@@ -200,12 +213,14 @@ class Regions:
 
     def stopping(self, sight: Sight) -> Stopping:
         """Before what this sensor sees."""
-        latency_s = max(LEAST_LATENCY_S, sight.latency_s + REACTION_S) + sight.period_s
+        came_after_s = sight.came_mono_s - sight.t_mono_s
+        seen_after_s = max(sight.latency_s, came_after_s if came_after_s > OLD_S else 0.0)
+        latency_s = max(LEAST_LATENCY_S, seen_after_s + REACTION_S) + sight.period_s
         return stopping_of(self.settings, sight.sensor, latency_s=latency_s)
 
     def eyes(self, now_s: float) -> list[Sight]:
-        """Those that work, one late frame or not."""
-        return [sight for sight in self.sights.values() if sight.counts and now_s - sight.t_mono_s <= BLIND_S]
+        """Those that work, late frames or not."""
+        return [sight for sight in self.sights.values() if sight.is_eye(now_s)]
 
     def fresh(self, now_s: float) -> list[Sight]:
         """Those whose word counts at present."""
@@ -213,7 +228,7 @@ class Regions:
 
     def slowest(self, now_s: float) -> tuple[Sight, float] | None:
         """The sensor whose region allows least speed, and that speed: what only it sees must be stopped for, too."""
-        speeds = [(sight, self.stopping(sight).largest_speed_m_s(sight.depth_m)) for sight in self.fresh(now_s)]
+        speeds = [(sight, self.stopping(sight).largest_speed_m_s(sight.depth_m)) for sight in self.eyes(now_s)]
         return min(speeds, key=lambda pair: pair[1], default=None)
 
     def _depth_m(self, status: PerceptionStatus) -> float:

@@ -48,7 +48,9 @@ class TrustedSensors:
         """Why nothing can be told about what is ahead now; empty while all is well."""
         sight = self._regions.oldest(self.sensors, now_s)
         advice = "It climbs on by itself once something comes. Or return home."
-        missing = "" if sight is None else f"Nothing new from {SENSOR_WORDS[sight.sensor]}. {advice}"
+        missing = ""
+        if sight is not None:
+            missing = f"{_late(sight, now_s) or f'Nothing new from {SENSOR_WORDS[sight.sensor]}.'} {advice}"
         if not self.sensors and not self._regions.counted(now_s):
             missing = f"No sensor sees ahead. {advice}"
         return _old_position(state, now_s) or missing
@@ -63,7 +65,12 @@ def _silence(sight: Sight, now_s: float) -> str:
     """Its own words where it still speaks."""
     if sight.why and now_s - sight.t_mono_s <= OLD_S:
         return f"{sight.why} Resume goes on all the same."
-    return f"No frames from {SENSOR_WORDS[sight.sensor]}. Resume goes on without them."
+    missing = _late(sight, now_s) or f"No frames from {SENSOR_WORDS[sight.sensor]}."
+    return f"{missing} Resume goes on without them."
+
+
+def _late(sight: Sight, now_s: float) -> str:
+    return f"Frames from {SENSOR_WORDS[sight.sensor]} come over {OLD_S:g} s late." if sight.late_s(now_s) else ""
 
 
 def _old_position(state: VehicleState, now_s: float) -> str:
