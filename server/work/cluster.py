@@ -32,7 +32,7 @@ LOCAL = "local"
 MOST_LOCAL_WORKERS = 256
 PER_WORKER = 4
 """Pieces on their way for each worker: one in work, the others so that it never waits."""
-_JOIN_S, _TOLD_EVERY_S = 30.0, 0.5
+_REACH_S, _JOIN_S, _TOLD_EVERY_S = 30.0, 30.0, 0.5
 _DECIDE = ("numpy", "numba", "scipy", "rasterio", "pyproj")
 _LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
 
@@ -99,7 +99,7 @@ def _answer(future: Any, tell: Callable[[], None]) -> Any:
             return future.result(timeout=_TOLD_EVERY_S)
         except TimeoutError:
             if future.status == "error":
-                raise  # the piece's own
+                return future.result()  # raises the piece's own, which may have come just now
         except (CancelledError, OSError) as error:
             if future.status == "error":
                 raise
@@ -140,7 +140,7 @@ def _client(where: str) -> Iterator[Any]:
         return
     client = distributed.Client.__new__(distributed.Client)
     try:
-        client.__init__(where, timeout=_JOIN_S, set_as_default=False)
+        client.__init__(where, timeout=_REACH_S, set_as_default=False)
     except Exception as error:  # it gives up in any way: no answer, no key, an attempt that it cancelled itself
         # Collected as garbage it would close in any thread, and in that of a loop which starts wait for ever.
         with suppress(Exception):  # where it failed before it had anything to close

@@ -103,6 +103,17 @@ def test_what_a_piece_raises_comes_through_as_it_is(scheduler: str) -> None:
         list(spread(_late, [0], scheduler, lambda share: None))
 
 
+def test_what_a_piece_raised_just_after_it_was_looked_at_is_told_as_it_is() -> None:
+    class Late:
+        status = "error"
+
+        def result(self, timeout: float | None = None) -> None:
+            raise TimeoutError if timeout is not None else PoiError("outside")
+
+    with pytest.raises(PoiError, match="outside"):
+        cluster._answer(Late(), lambda: None)
+
+
 def test_a_worker_that_dies_loses_nothing_and_a_piece_that_ends_every_worker_is_named(tmp_path: Path) -> None:
     pieces = [(tmp_path / "died", number) for number in range(6)]
     with _running() as mortal:
@@ -113,7 +124,7 @@ def test_a_worker_that_dies_loses_nothing_and_a_piece_that_ends_every_worker_is_
 
 
 def test_processes_of_its_own_have_keys_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cluster, "_JOIN_S", 2.0)
+    monkeypatch.setattr(cluster, "_REACH_S", 2.0)
     answers = spread(_worked_out, [0, 1, 2], "local:2", lambda share: None)
     first = next(answers)
     (running,) = [one for one in distributed.Client._instances if one.status == "running"]
@@ -130,9 +141,11 @@ def test_processes_of_its_own_have_keys_of_their_own(monkeypatch: pytest.MonkeyP
 
 
 def test_a_scheduler_that_is_not_there_or_has_no_worker_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as hasty:
+        hasty.setattr(cluster, "_REACH_S", 1.0)
+        with pytest.raises(ClusterError, match=r"tcp://127\.0\.0\.1:1: No Dask scheduler is reached"):
+            list(spread(_worked_out, [0], "tcp://127.0.0.1:1", lambda share: None))
     monkeypatch.setattr(cluster, "_JOIN_S", 1.0)
-    with pytest.raises(ClusterError, match=r"tcp://127\.0\.0\.1:1: No Dask scheduler is reached"):
-        list(spread(_worked_out, [0], "tcp://127.0.0.1:1", lambda share: None))
     with _running(workers=0) as empty, pytest.raises(ClusterError, match="No worker has joined"):
         list(spread(_worked_out, [0], empty, lambda share: None))
 
