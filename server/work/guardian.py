@@ -110,6 +110,8 @@ class Guardian:
             if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN:  # nohup means it
                 signal.signal(number, self._on_signal)
         while True:
+            self._reap(self._spare)  # it may have ended with the server, as when memory runs out
+            self._drop_dead_spare()
             server, self._spare = self._spare or _Server(self._command), None
             server.greet({"link": self._link, "silent_since_t_mono_s": self._silent_since_s})
             how = self._watch(server)
@@ -150,19 +152,26 @@ class Guardian:
         return hung or f"ended {_ending(server.code or 0)}"
 
     def _runs(self, server: _Server) -> bool:
-        """Reaps whatever has ended: process 1 of a container inherits the nodes of a server that died."""
-        with contextlib.suppress(ChildProcessError):
-            while (ended := os.waitpid(-1, os.WNOHANG))[0]:
-                for each in (server, self._spare):
-                    if each is not None and ended[0] == each.pid:
-                        each.code = os.waitstatus_to_exitcode(ended[1])
+        self._reap(server, self._spare)
         return server.code is None
 
-    def _keep_spare(self, server: _Server) -> None:
-        now_s = time.monotonic()
+    @staticmethod
+    def _reap(*servers: _Server | None) -> None:
+        """Whatever has ended: process 1 of a container inherits the nodes of a server that died."""
+        with contextlib.suppress(ChildProcessError):
+            while (ended := os.waitpid(-1, os.WNOHANG))[0]:
+                for each in servers:
+                    if each is not None and ended[0] == each.pid:
+                        each.code = os.waitstatus_to_exitcode(ended[1])
+
+    def _drop_dead_spare(self) -> None:
         if self._spare is not None and self._spare.code is not None:
             self._spare.channel.close()
-            self._spare, self._spare_ended_s = None, now_s
+            self._spare, self._spare_ended_s = None, time.monotonic()
+
+    def _keep_spare(self, server: _Server) -> None:
+        self._drop_dead_spare()
+        now_s = time.monotonic()
         is_steady = server.has_answered and now_s - server.started_s > SPARE_AFTER_S
         may_try = is_steady and self._asked_s is None and now_s - self._spare_ended_s > SPARE_AGAIN_S
         if self._spare is None and may_try:
