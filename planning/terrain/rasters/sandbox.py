@@ -26,6 +26,8 @@ _PACKAGE = __name__.rpartition(".")[0]
 _ROOT = Path(__file__).resolve().parents[__name__.count(".")]
 _COMMAND = [sys.executable, "-P", "-m", f"{_PACKAGE}.worker"]
 _LONGEST_MESSAGE = 2**22
+_START_S = 120.0
+"""Until a worker has its modules: a busy machine's time is no fault of the file's."""
 _SMALLER = "Rewrite it as a tiled GeoTIFF, or crop it to the area of the flight."
 _ERRORS = {"format": RasterFormatError, "too_large": RasterTooLargeError, "no_elevation": NoElevationError}
 # GDAL reads these before Python can set them through rasterio.Env: drivers register on import.
@@ -79,13 +81,15 @@ def run_job(
     """
     with (directory / "stderr").open("w+b") as stderr:
         worker = _start(directory, stderr, *pipe)
-        clock = _Deadline(worker, limits.header_s)
+        clock = _Deadline(worker, max(_START_S, limits.header_s))
         try:
             bounds = {"memory_bytes": limits.max_memory_bytes, "cpu_s": int(limits.decode_s) + 1}
             _send(worker, {"writable": [str(directory)], **job, **bounds})
             for message in _messages(worker):
                 kind = message.pop("type")
-                if kind == "header":
+                if kind == "ready":
+                    clock.extend(limits.header_s)
+                elif kind == "header":
                     order = on_header(message) if on_header else {}
                     clock.extend(limits.decode_s)
                     _send(worker, order)

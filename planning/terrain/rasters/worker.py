@@ -45,6 +45,7 @@ def main() -> None:
         decoder = importlib.import_module(f"{job.get('decoder', _OURS)}.decode")
 
         confine_files(readable=_readable(job), writable=[Path(path) for path in job["writable"]])
+        send("ready")
         decoder.JOBS[job["job"]](job, send, partial(_ask, send))
     except Exception as error:
         send("error", **_explain(error, job["job"]))
