@@ -105,17 +105,18 @@ def _run(name: str, runtime_dir: Path, main: NodeMain, context: NodeContext) -> 
 
 
 async def _live(name: str, runtime_dir: Path, main: NodeMain, context: NodeContext) -> None:
+    asked = asyncio.Event()
+    for number in (signal.SIGTERM, signal.SIGINT):  # from here on, also while it joins the bus
+        asyncio.get_running_loop().add_signal_handler(number, asked.set)
     async with await Bus.open(runtime_dir, name) as bus:
         working = asyncio.ensure_future(main(bus, context))
         listening = asyncio.ensure_future(_watch_server(bus, context))
-        loop = asyncio.get_running_loop()
-        for number in (signal.SIGTERM, signal.SIGINT):
-            loop.add_signal_handler(number, working.cancel)
-        done, others = await asyncio.wait((working, listening), return_when=asyncio.FIRST_COMPLETED)
+        ending = asyncio.ensure_future(asked.wait())
+        done, others = await asyncio.wait((working, listening, ending), return_when=asyncio.FIRST_COMPLETED)
         for task in others:
             task.cancel()
         await asyncio.gather(*others, return_exceptions=True)
-        for task in done:
+        for task in (*done, working):
             if not task.cancelled():
                 task.result()
 

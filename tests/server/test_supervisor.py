@@ -1,6 +1,7 @@
 """The supervisor, with a node that is a few lines long: started, found again, started anew, ended."""
 
 import asyncio
+import contextlib
 import itertools
 import os
 import re
@@ -33,10 +34,10 @@ async def main(bus, context):
         raise KeyError("inside")
     if "--free" in sys.argv:
         context.set_replaceable(True)
-    print("a line of", sys.argv, flush=True)
     if "--deaf" in sys.argv:
         asyncio.get_running_loop().remove_signal_handler(signal.SIGTERM)
         signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    print("a line of", sys.argv, flush=True)
     once = Path(sys.argv[2]) / "busy-once"
     if "--busy" in sys.argv and not once.exists():
         once.touch()
@@ -106,6 +107,11 @@ async def until(condition: Callable[[], bool]) -> None:
         await asyncio.sleep(0.02)
 
 
+def lines(folder: Path, name: str) -> int:
+    """How many nodes of that name have said that they work."""
+    return (folder / f"{name}.log").read_text().count("a line of")
+
+
 def run(whole: Callable[[], Awaitable[None]]) -> None:
     async def main() -> None:
         await whole()
@@ -122,6 +128,7 @@ def test_a_node_is_started_in_a_session_of_its_own_and_stopped(folder: Path) -> 
             assert os.getsid(facts.pid) == facts.pid
             await watched.supervisor.start("link", ["--a", "b"])
             assert await watched.running("link") == facts
+            await until(lambda: lines(folder, "link") == 1)  # before, nobody in it hears that it is to end
             await watched.supervisor.stop("link")
             assert running_node(folder, "link") is None
             # On a busy machine it may be silent for a moment.
@@ -129,6 +136,7 @@ def test_a_node_is_started_in_a_session_of_its_own_and_stopped(folder: Path) -> 
             assert [state for state, _ in itertools.groupby(told)] == ["starting", "running", "stopped"]
             await watched.supervisor.start("link", [])
             assert (await watched.running("link")).arguments == ("--runtime", str(folder))
+            await until(lambda: lines(folder, "link") == 2)
             await watched.supervisor.stop("link")
         log = (folder / "link.log").read_text()
         assert "a line of" in log
@@ -244,7 +252,11 @@ def test_a_node_holds_nothing_of_the_server_that_started_it(folder: Path) -> Non
         async with await Bus.open(folder, "server"), supervised(folder) as watched:
             await watched.supervisor.start("link", [])
             facts = await watched.running("link")
-            held = [os.readlink(path) for path in Path(f"/proc/{facts.pid}/fd").iterdir() if path.is_symlink()]
+            await until(lambda: lines(folder, "link") == 1)  # it has opened what it holds
+            held = list[str]()
+            for path in Path(f"/proc/{facts.pid}/fd").iterdir():
+                with contextlib.suppress(FileNotFoundError):
+                    held.append(os.readlink(path))
             assert [path for path in held if "server" in path] == []
         async with await Bus.open(folder, "server"), supervised(folder) as watched:  # of a server that comes later
             assert await watched.running("link") == facts
@@ -261,7 +273,7 @@ def test_a_node_that_does_not_listen_is_killed(folder: Path, monkeypatch: pytest
         async with supervised(folder) as watched:
             await watched.supervisor.start("recorder", ["--deaf"])
             await watched.running("recorder")
-            await until(lambda: "a line of" in (folder / "recorder.log").read_text())
+            await until(lambda: lines(folder, "recorder") == 1)
             asked_s = time.monotonic()
             await watched.supervisor.stop("recorder")
             assert time.monotonic() - asked_s >= within_s
