@@ -24,10 +24,10 @@ from planning.terrain.dsm import Dsm
 from server.library import Library
 from server.library.terrains import store_terrain
 from server.schemas import PlanDoc, PoiDoc
+from tests.free_ports import free_port
 from tests.server.simulated import simulated_vehicle
 from tests.server.station import ok
 from tests.server.test_flying_process import Server
-from tests.server.test_process import free_port
 
 _WEST_M, _SOUTH_M, _CELL_M = 500_000.0, 4_175_000.0, 0.1
 

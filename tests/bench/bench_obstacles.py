@@ -30,8 +30,8 @@ from websockets.typing import Origin, Subprotocol
 from server.scene.host import SUBPROTOCOL
 from telemetry.bus.node_lock import running_nodes
 from telemetry.topics.obstacles import Sensor
+from tests.free_ports import free_port
 from tests.server.station import PATIENCE_S, ok
-from tests.server.test_process import free_port
 
 POINTS, SECONDS = 100_000, 60.0
 ASKED_S: dict[Sensor, float] = {"radar": 0.15, "vision": 0.3}

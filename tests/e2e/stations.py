@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from telemetry.bus.node_lock import running_nodes
+from tests.free_ports import free_port
 from tests.server.running import client
 from tests.server.station import PATIENCE_S, ok
 
@@ -40,7 +40,7 @@ class Station:
         self.start()
 
     def start(self) -> None:
-        port = _free_port()
+        port = free_port()
         command = [*self._program, "serve", "--no-guardian", "--port", str(port), "--data-dir", str(self.data_dir)]
         # Flights of other tests meet no obstacles: a later option wins.
         command.append("--no-demo-world")
@@ -151,7 +151,7 @@ class SimulatedVehicle:
     RTL_CM = 6000
 
     def __init__(self, *, speedup: float = 10.0) -> None:
-        self.address = f"tcp:127.0.0.1:{_free_port()}"
+        self.address = f"tcp:127.0.0.1:{free_port()}"
         command = [sys.executable, "-m", "server", "sim", "--link", self.address.replace("tcp", "tcpin", 1)]
         command += ["--home", self.HOME, "--speedup", str(speedup), "--parameter", f"RTL_ALT={self.RTL_CM}"]
         self._process = subprocess.Popen(
@@ -165,9 +165,3 @@ class SimulatedVehicle:
         if self._process.poll() is None:
             self._process.kill()
             self._process.communicate()
-
-
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]

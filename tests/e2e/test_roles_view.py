@@ -20,6 +20,7 @@ from telemetry.link.keys import audit_key_file
 from telemetry.topics.messages import CommandRecord
 from tests.e2e.stations import SimulatedVehicle, Station
 from tests.e2e.steps import PATIENCE_MS, STREAM, certified, connect, enter, hold, open_demo
+from tests.free_ports import free_port
 from tests.server.station import ok
 from tests.telemetry.frames import heartbeat, packed
 
@@ -283,9 +284,7 @@ def radio(port: int) -> Iterator[None]:
 
 
 def test_a_vehicle_that_comes_back_from_another_port_is_taken_by_one_press(station: Station, page: Page) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     address = f"udpin:127.0.0.1:{port}"
     enter(page, station)
     page.get_by_test_id("tab-fly").click()

@@ -19,9 +19,10 @@ from server.door.sensor_token import sensor_token
 from server.settings import RUNTIME_FOLDER
 from telemetry.bus.bus import Bus
 from telemetry.topics.messages import Topic
+from tests.free_ports import free_port
 from tests.server.cli_runs import hedgehop
 from tests.server.running import running
-from tests.telemetry.ros2_bench import PATIENCE_S, free_port, process, wait_for
+from tests.telemetry.ros2_bench import PATIENCE_S, process, wait_for
 from tests.telemetry.ros2_robot import CLOUD, TF
 from tests.telemetry.test_ros2_telling import state, told
 

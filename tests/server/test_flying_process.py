@@ -20,10 +20,11 @@ from websockets.typing import Origin
 
 from server.cli import UNGUARDED
 from telemetry.bus.node_lock import running_nodes
+from tests.free_ports import free_port
 from tests.server.running import client
 from tests.server.simulated import QUICKLY_DOWN, simulated_vehicle
 from tests.server.station import PATIENCE_S, ok
-from tests.server.test_process import command, free_port
+from tests.server.test_process import command
 
 pytestmark = [pytest.mark.xdist_group("real-time"), pytest.mark.slow]
 

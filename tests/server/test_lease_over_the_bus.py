@@ -22,8 +22,9 @@ from telemetry.topics.requests import (
     ReturnHome,
     highest_possible_token,
 )
+from tests.free_ports import free_port
 from tests.telemetry.bus_runs import run
-from tests.telemetry.link_bench import free_port, until
+from tests.telemetry.link_bench import until
 from tests.telemetry.test_link_node import Node, station
 
 ANNA, BEN = "a" * 64, "b" * 64

@@ -10,10 +10,11 @@ from server.work.supervisor import Supervisor
 from telemetry.bus.bus import Bus
 from telemetry.bus.node_lock import running_node
 from telemetry.nodes.link import read_memory
+from tests.free_ports import free_port
 from tests.telemetry.bus_runs import run, short_folder
 from tests.telemetry.fake_vehicle import UdpVehicle
 from tests.telemetry.frames import heartbeat
-from tests.telemetry.link_bench import free_port, until
+from tests.telemetry.link_bench import until
 
 LOADED_S = 15.0
 """At a load of ten for each processor; on a quiet machine it takes less than a second."""

@@ -9,7 +9,6 @@ import re
 import select
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -25,17 +24,12 @@ from server.cli import UNGUARDED
 from server.library import Library
 from server.library.history import History
 from server.plan.demo import PLAN_NAME
+from tests.free_ports import free_port
 from tests.server.cli_runs import hedgehop
 from tests.server.running import client
 from tests.server.station import PATIENCE_S, ok
 
 pytestmark = pytest.mark.xdist_group("process")
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def command(data_dir: Path, port: int, *more: str) -> list[str]:

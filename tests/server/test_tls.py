@@ -37,7 +37,7 @@ from server.errors import CertificateError, StartError
 from server.scene.host import SUBPROTOCOL
 from server.schemas import AlarmsMessage, ServerMessage
 from server.settings import Settings
-from tests.server.test_process import free_port
+from tests.free_ports import free_port
 
 HERE = Names(frozenset({"localhost", "laptop", "laptop.local"}), frozenset({ipaddress.ip_address("127.0.0.1")}))
 MOVED = HERE.with_given(["192.168.7.5"])
@@ -211,7 +211,7 @@ def test_the_link_is_https_and_signs_in_who_trusts_the_authority(
     health = client.get("/api/health", headers={"Cookie": cookie}).json()
     assert "loop" in health
     with pytest.raises(httpx.ConnectError, match="self-signed certificate"):
-        httpx.get(f"{station.origin}/api/health")
+        httpx.get(f"{station.origin}/api/health", timeout=60)
 
 
 def test_who_signs_in_is_led_to_where_a_device_comes_to_trust_it(station: Secure, client: httpx.Client) -> None:
@@ -299,8 +299,8 @@ def test_old_versions_and_plain_text_are_refused(station: Secure) -> None:
     old.minimum_version = ssl.TLSVersion.MINIMUM_SUPPORTED
     old.maximum_version = ssl.TLSVersion.TLSv1_1
     for attempt in (
-        lambda: httpx.get(f"{station.origin}/api/health", verify=old),
-        lambda: httpx.get(f"{station.origin.replace('https', 'http')}/api/health"),
+        lambda: httpx.get(f"{station.origin}/api/health", verify=old, timeout=60),
+        lambda: httpx.get(f"{station.origin.replace('https', 'http')}/api/health", timeout=60),
     ):
         with pytest.raises(httpx.TransportError):
             attempt()
@@ -326,9 +326,13 @@ def test_one_who_dawdles_over_the_handshake_is_cut_off_and_one_who_asks_at_once_
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
         files.renew(now_utc())
         context.load_cert_chain(files.server)
-        made = behind_tls(cast(Any, Echo), context, OpenConnections(4, 4), handshake_s=1.0)
-        server = await asyncio.get_running_loop().create_server(made, "127.0.0.1", 0)
-        port = server.sockets[0].getsockname()[1]
+
+        async def serve(handshake_s: float) -> tuple[asyncio.Server, int]:
+            made = behind_tls(cast(Any, Echo), context, OpenConnections(4, 4), handshake_s=handshake_s)
+            server = await asyncio.get_running_loop().create_server(made, "127.0.0.1", 0)
+            return server, server.sockets[0].getsockname()[1]
+
+        (hasty, port), (server, patient_port) = await serve(1.0), await serve(60.0)
         reader, dawdling = await asyncio.open_connection("127.0.0.1", port)
         async with asyncio.timeout(60):
             with contextlib.suppress(ConnectionResetError):
@@ -337,7 +341,7 @@ def test_one_who_dawdles_over_the_handshake_is_cut_off_and_one_who_asks_at_once_
         trusting = ssl.create_default_context(cafile=files.authority)
         incoming, outgoing = ssl.MemoryBIO(), ssl.MemoryBIO()
         client = trusting.wrap_bio(incoming, outgoing, server_hostname="localhost")
-        reader, writer = await asyncio.open_connection("127.0.0.1", port)
+        reader, writer = await asyncio.open_connection("127.0.0.1", patient_port)
         async with asyncio.timeout(60):
             while True:
                 try:
@@ -356,8 +360,9 @@ def test_one_who_dawdles_over_the_handshake_is_cut_off_and_one_who_asks_at_once_
                     incoming.write(await reader.read(65536))
         writer.close()
         await writer.wait_closed()
-        server.close()
-        await server.wait_closed()
+        for each in (hasty, server):
+            each.close()
+            await each.wait_closed()
 
     asyncio.run(whole())
 
@@ -389,7 +394,10 @@ def test_a_tablet_gets_the_authority_and_nothing_else(station: Secure) -> None:
 
 def test_a_new_certificate_is_taken_up_while_it_serves(station: Secure) -> None:
     def serial() -> str:
-        with httpx.Client(verify=station.trusting) as client, client.stream("GET", f"{station.origin}/signin") as got:
+        with (
+            httpx.Client(verify=station.trusting, timeout=60) as client,
+            client.stream("GET", f"{station.origin}/signin") as got,
+        ):
             return got.extensions["network_stream"].get_extra_info("ssl_object").getpeercert()["serialNumber"]
 
     before = serial()

@@ -17,7 +17,7 @@ from pathlib import Path
 from telemetry.bus.node_lock import running_node, running_nodes
 from telemetry.recording.flight_log import read_flight_log
 from telemetry.recording.recorded_flight import FlightLog
-from tests.server.test_process import free_port
+from tests.free_ports import free_port
 from tests.soak.faults import Done, Fault, do
 from tests.soak.page import Page
 

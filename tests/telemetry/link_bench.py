@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import socket
 from collections.abc import AsyncIterator, Callable
 from typing import Any
 
@@ -51,12 +50,6 @@ async def again_and_again(look: Callable[[], None], every_s: float) -> AsyncIter
         eye.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await eye
-
-
-def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
-    with socket.socket(socket.AF_INET, kind) as sock:
-        sock.bind(("127.0.0.1", 0))
-        return sock.getsockname()[1]
 
 
 class Console:
@@ -126,4 +119,4 @@ async def console(**options: Any) -> AsyncIterator[Console]:
         yield bench
 
 
-__all__ = ["ME", "PATIENCE_S", "Console", "Topic", "console", "free_port", "until"]
+__all__ = ["ME", "PATIENCE_S", "Console", "Topic", "console", "until"]

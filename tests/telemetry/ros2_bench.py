@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import socket
 import subprocess
 import sys
 import threading
@@ -17,12 +16,6 @@ from telemetry.agent.ros2_source import Ros2Asked, Ros2Source
 from telemetry.ros2.zenoh_endpoint import zenoh_address
 
 PATIENCE_S = 60.0
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 class Process:

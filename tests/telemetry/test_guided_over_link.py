@@ -26,7 +26,8 @@ from telemetry.topics.requests import (
     StartGuided,
     StopMotors,
 )
-from tests.telemetry.link_bench import ME, Console, console, free_port, until
+from tests.free_ports import free_port
+from tests.telemetry.link_bench import ME, Console, console, until
 from tests.telemetry.own_time import run
 from tests.telemetry.test_mavlink_flights import LAT_DEG, LON_DEG, QUICKLY_DOWN
 from tests.telemetry.udp_faults import Proxy, lossy_udp

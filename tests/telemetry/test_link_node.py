@@ -39,8 +39,9 @@ from telemetry.topics.requests import (
     Upload,
 )
 from telemetry.topics.vehicle import VehicleState
+from tests.free_ports import free_port
 from tests.telemetry.bus_runs import ROOT, run
-from tests.telemetry.link_bench import free_port, until
+from tests.telemetry.link_bench import until
 from tests.telemetry.test_mavlink_flights import ALT_M, LAT_DEG, LON_DEG, QUICKLY_DOWN, items
 
 ME = Operator("Ann", 7)

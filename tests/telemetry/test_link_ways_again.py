@@ -9,9 +9,10 @@ from typing import Any, cast
 from telemetry.link.answering import OperatorRight
 from telemetry.nodes.link import LinkNode, Memory, Wanted, read_memory
 from telemetry.topics.messages import Candidate
+from tests.free_ports import free_port
 from tests.telemetry.fake_vehicle import UdpVehicle
 from tests.telemetry.frames import heartbeat
-from tests.telemetry.link_bench import console, free_port, until
+from tests.telemetry.link_bench import console, until
 from tests.telemetry.own_time import run
 from tests.telemetry.test_link_several_ways import at, reached, used, vehicle
 from tests.telemetry.udp_faults import lossy_udp

@@ -15,7 +15,8 @@ import pytest
 from telemetry.mavlink.address import Address, parse_address
 from telemetry.mavlink.connections import Connection, Receiver, make_connection
 from telemetry.mavlink.connections.base import RETRY_S, described
-from tests.telemetry.link_bench import free_port, until
+from tests.free_ports import free_port
+from tests.telemetry.link_bench import until
 from tests.telemetry.own_time import run
 
 
@@ -189,7 +190,7 @@ def test_tcp_reconnects_a_hundred_times_and_leaks_nothing(monkeypatch: pytest.Mo
 
 def test_tcp_tries_again_without_spinning_while_nobody_answers() -> None:
     async def whole() -> None:
-        address = f"tcp:127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+        address = f"tcp:127.0.0.1:{free_port()}"
         async with listening(address) as ear:
             await until(lambda: ear.connection.error)
             assert ear.connection.error is not None
@@ -230,7 +231,7 @@ def test_a_reader_that_has_stopped_costs_frames_not_memory() -> None:
 
 def test_tcp_server_tells_its_clients_apart() -> None:
     async def whole() -> None:
-        port = free_port(socket.SOCK_STREAM)
+        port = free_port()
         async with listening(f"tcpin:127.0.0.1:{port}") as ear:
             await is_open(ear)
             (r1, w1), (_, w2) = [await asyncio.open_connection("127.0.0.1", port) for _ in range(2)]

@@ -13,9 +13,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from telemetry.errors import NotAllowedError
 from telemetry.topics.requests import Adopt, Arm, Connect, Resume, ReturnHome, Upload
 from telemetry.topics.vehicle import VehicleState
+from tests.free_ports import free_port
 from tests.telemetry.fake_vehicle import UdpVehicle, ack
 from tests.telemetry.frames import packed
-from tests.telemetry.link_bench import ME, Console, console, free_port, until
+from tests.telemetry.link_bench import ME, Console, console, until
 from tests.telemetry.own_time import run
 
 AUTO, RTL, LOITER = 3, 6, 5

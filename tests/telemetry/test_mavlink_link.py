@@ -37,9 +37,10 @@ from telemetry.topics.requests import (
     ReturnHome,
     Upload,
 )
+from tests.free_ports import free_port
 from tests.telemetry.fake_vehicle import UdpVehicle, ack, beat
 from tests.telemetry.frames import ARMED, attitude, ground_station_heartbeat, heartbeat, packed
-from tests.telemetry.link_bench import ME, Console, console, free_port, until
+from tests.telemetry.link_bench import ME, Console, console, until
 from tests.telemetry.own_time import run
 
 

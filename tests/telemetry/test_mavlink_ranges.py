@@ -15,8 +15,9 @@ from mapping.sensor_frames import RangeFrame
 from telemetry.mavlink.ranges import RangeReader
 from telemetry.topics.messages import Topic
 from telemetry.topics.requests import Connect
+from tests.free_ports import free_port
 from tests.telemetry.fake_vehicle import UdpVehicle, beat
-from tests.telemetry.link_bench import ME, console, free_port, until
+from tests.telemetry.link_bench import ME, console, until
 from tests.telemetry.own_time import run
 
 NOTHING, UNKNOWN = 1001, 65535

@@ -20,9 +20,10 @@ from telemetry.mavlink.signing import COPY, EPOCH_S, FARTHEST, MOST_WAYS, PER_S,
 from telemetry.simulation.simulator.run import SimOptions, flying
 from telemetry.topics.messages import RawFrame
 from telemetry.topics.requests import Arm, Connect, SetSigning
+from tests.free_ports import free_port
 from tests.telemetry.fake_vehicle import UdpVehicle, beat
 from tests.telemetry.frames import attitude, heartbeat, packed
-from tests.telemetry.link_bench import ME, console, free_port, until
+from tests.telemetry.link_bench import ME, console, until
 from tests.telemetry.own_time import run
 
 KEY = bytes(range(32))

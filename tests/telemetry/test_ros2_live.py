@@ -17,11 +17,13 @@ from telemetry.agent.ros2_source import ROWS, Ros2Asked
 from telemetry.ros2.listener import Ros2Listener
 from telemetry.ros2.wire import MOST_BYTES
 from telemetry.ros2.zenoh_endpoint import zenoh_address
-from tests.telemetry.ros2_bench import Process, free_port, process, reading, wait_for
+from tests.free_ports import free_port
+from tests.telemetry.ros2_bench import Process, process, reading, wait_for
 from tests.telemetry.ros2_robot import CLOUD, GID, ODOM, TF, cloud, transforms
 
 pytestmark = pytest.mark.xdist_group("ros2")
 RADAR = Ros2Asked("/radar/points", "radar")
+LEFT = ("left_out", "refused", "unplaced")
 TARGET = {"frame": "radar", "points": [[5.0, 1.0, 0.0, -0.5, 20.0]], "names": ["x", "y", "z", "doppler", "snr"]}
 
 
@@ -64,9 +66,11 @@ def test_a_radars_targets_come_through_the_frames_of_the_robot(robot: Process, p
         first: RadarReading = send_until(robot, lambda: reader.of(RadarReading))[0]
         assert first.targets == pytest.approx(np.array([[-5.0, -0.5, 0.2, -0.5, 20.0]]), abs=1e-5)  # right, forward, up
         assert began_s - 0.1 < first.t_s <= time.monotonic()
+        met = reader.source.status.as_dict()  # until both have met a cloud may come before the robot's frames
         send_until(robot, lambda: any(not len(each.targets) for each in reader.of(RadarReading)), points=[])
         status = reader.source.status.as_dict()
-        assert status["left_out"] == status["refused"] == status["unplaced"] == {}
+        assert [status[left] for left in LEFT] == [met[left] for left in LEFT]
+        assert not met["refused"]
         reader.wait_told("/radar/points: no message for 2 s")
         send_until(robot, lambda: any("messages come again" in each for each in reader.told))
 
@@ -124,7 +128,7 @@ def test_the_router_is_lost_and_found_again(port: int) -> None:
             gone_s = time.monotonic()
             router.kill()
             assert "tried again" in reader.wait_told("The router is gone")
-            assert time.monotonic() - gone_s < 10.0
+            assert time.monotonic() - gone_s < 60.0
             wait_for(lambda: reader.of(NoticeReading), "word for the pilot")
             router = Process(port, "router")
             reader.wait_told("The router is back")

@@ -27,7 +27,8 @@ from telemetry.ros2.zenoh_endpoint import zenoh_address
 from telemetry.topics.messages import Topic
 from telemetry.topics.obstacles import MapDelta, MapOrigin, ObstacleAlert, pack_keys
 from telemetry.topics.vehicle import VehicleState
-from tests.telemetry.ros2_bench import PATIENCE_S, Process, free_port, process, reading, wait_for
+from tests.free_ports import free_port
+from tests.telemetry.ros2_bench import PATIENCE_S, Process, process, reading, wait_for
 from tests.telemetry.ros2_robot import CLOUD, HASHES, ODOM
 
 pytestmark = pytest.mark.xdist_group("ros2")

@@ -12,9 +12,10 @@ from telemetry.topics.messages import Topic
 from telemetry.topics.obstacles import ObstacleAlert
 from telemetry.topics.requests import Connect
 from telemetry.topics.traffic import TrafficSettings, TrafficStatus
+from tests.free_ports import free_port
 from tests.telemetry.fake_vehicle import UdpVehicle, beat
 from tests.telemetry.frames import ARMED, heartbeat, packed
-from tests.telemetry.link_bench import ME, console, free_port, until
+from tests.telemetry.link_bench import ME, console, until
 from tests.telemetry.own_time import run
 from tests.telemetry.traffic_messages import HERE, adsb_message, e7
 
