@@ -71,5 +71,6 @@ def test_the_health_check_tells_a_server_from_none(tmp_path: Path) -> None:
         return subprocess.run(command, env={"HEDGEHOP_PORT": str(port)}, capture_output=True, check=False).returncode
 
     with running(tmp_path) as server:
-        assert healthy(server.settings.port) == 0
+        # It waits for 2 s: a busy machine may answer later, once.
+        assert any(healthy(server.settings.port) == 0 for _ in range(10))
     assert healthy(server.settings.port) != 0

@@ -36,7 +36,7 @@ class Ranges(http.server.BaseHTTPRequestHandler):
         data, fault = self.server.files.get(self.path), self.server.fault
         if fault == "silent":
             self.server.reached.set()
-            self.server.released.wait(20)
+            self.server.released.wait(120)
             return
         if fault == "hangs up":
             self.close_connection = True
@@ -188,14 +188,14 @@ def test_nothing_else_is_asked_for(server: Server, address: str) -> None:
 def test_what_a_server_does_wrong_is_said(server: Server, fault: str, words: str) -> None:
     server.fault = fault
     with pytest.raises(RasterError, match=words):
-        remote(server, timeout_s=0.2, request_s=0.4)
+        remote(server, **{"drips": {"request_s": 0.4}, "silent": {"timeout_s": 0.2}}.get(fault, {}))
     assert all(path == "/dsm/model.tif" for path, _ in server.asked)
 
 
 def test_what_goes_wrong_while_it_is_read_is_said(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dsm_file, "LARGE_PX", 0)
     monkeypatch.setattr(dsm_file, "AHEAD_PX", 4)
-    file = remote(server, timeout_s=0.5)
+    file = remote(server)
     model = open_dsm(file)
     for fault, version, words in (("other bytes", 1, "other bytes"), ("", 2, "another version")):
         file._blocks.clear()
@@ -247,7 +247,7 @@ def test_no_read_may_fail_unnoticed(
 
 
 def test_whoever_is_interrupted_waits_for_no_server(server: Server) -> None:
-    file = remote(server, timeout_s=30.0)
+    file = remote(server, timeout_s=300.0)
     look, server.fault = Look(file), "silent"
     began = time.monotonic()
     ends: list[Served] = []
@@ -256,12 +256,12 @@ def test_whoever_is_interrupted_waits_for_no_server(server: Server) -> None:
         with served(look.read, look.stop) as end:
             ends.append(end)
             os.write(end.child[1], struct.pack(">QQ", 0, 4))
-            assert server.reached.wait(20)
+            assert server.reached.wait(60)
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         interrupted()
-    assert time.monotonic() - began < 10.0
+    assert time.monotonic() - began < 60.0
     assert "stopped" in str(ends[0].error)
     with pytest.raises(RasterError, match="stopped"):
         look.read(0, 4)

@@ -136,6 +136,7 @@ def test_an_upload_that_is_broken_off_leaves_nothing_and_is_no_fault(served: Run
     told: queue.Queue[logging.LogRecord] = queue.Queue()
     handler = logging.handlers.QueueHandler(told)
     watched = [logging.getLogger(name) for name in ("hedgehop.http", "uvicorn.error")]
+    before = watched[0].level
     watched[0].setLevel(logging.INFO)
     for logger in watched:
         logger.addHandler(handler)
@@ -152,6 +153,7 @@ def test_an_upload_that_is_broken_off_leaves_nothing_and_is_no_fault(served: Run
         served.http.get("/api/health")
         after = _until(told, "GET /api/health")
     finally:
+        watched[0].setLevel(before)
         for logger in watched:
             logger.removeHandler(handler)
     assert line.startswith("POST /api/terrains 400 ")

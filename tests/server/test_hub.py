@@ -274,7 +274,7 @@ def test_bytes_are_no_message() -> None:
 def test_a_flood_closes_the_stream() -> None:
     async def scenario(bench: Bench) -> None:
         socket, calm = await bench.join(), await bench.join()
-        for _ in range(int(hub_module.BURST) + 200):
+        for _ in range(int(hub_module.BURST) + 5000):
             socket.says('{"type": "hover_profile", "s_m": 1}')
         while socket.close_code is None:
             await asyncio.sleep(0.01)

@@ -78,13 +78,13 @@ def test_messages_flow_and_the_client_is_known_by_its_page(served: Running) -> N
             assert socket.subprotocol == SUBPROTOCOL
             assert isinstance(socket.recv(timeout=60), bytes)
             socket.send(encoded(CAMERA))
-            assert eventually(host.server.get_clients)
+            assert eventually(lambda: host.client(page_id) is not None)
             client = host.client(page_id)
             assert client is not None
             assert host.page_of_client(client.client_id) == page_id
             assert client.camera.position[2] == 5
         assert eventually(lambda: host.client(page_id) is None)
-        assert host.page_of_client(client.client_id) is None
+        assert eventually(lambda: host.page_of_client(client.client_id) is None)
 
 
 def test_two_pages_are_told_apart(served: Running) -> None:
@@ -126,14 +126,14 @@ def test_hostile_messages_reach_no_callback(served: Running) -> None:
         CAMERA | {"fov": float("nan")},
         CAMERA | {"position": ("a", "b", "c")},
     ]
-    with served.socket() as stream, view(served, page_id_of(stream)) as socket:
+    with served.socket() as stream, view(served, page_id := page_id_of(stream)) as socket:
         for message in hostile:
             socket.send(encoded(message))
         socket.send(b"\xc1" * 100)
         socket.send("text")
         socket.send(encoded(CAMERA))
         # The camera comes last: once it is there, everything before it was dropped or handled.
-        assert eventually(server.get_clients)
+        assert eventually(lambda: served.parts.scene_host.client(page_id) is not None)
     assert pressed == []
     assert server._share_tunnel is None
     button.remove()

@@ -72,6 +72,8 @@ def with_a_detour(document: PlanDoc) -> dict[str, Any]:
 
 def test_the_new_plan_is_flown_from_where_the_vehicle_holds(flying: Station) -> None:
     page = flying
+    ok(page.http.post("/api/flight/pause"))  # however long a busy machine plans, it is in the air then
+    page.until(lambda m: m.type == "flight" and m.flight.phase == "paused", LONG_S)
     old = page.state.document
     page.change(**with_a_detour(old))
     assert page.answer().state == "ready"

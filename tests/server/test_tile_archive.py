@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
 import shutil
+import signal
 import struct
 import zipfile
 from pathlib import Path
@@ -134,6 +136,8 @@ async def _killed(upload: Path) -> None:
 
     def progress(step: str, share: float | None) -> None:
         if step == "Unpacking" and share:
+            assert lane._worker is not None
+            os.kill(lane._worker._process.pid, signal.SIGSTOP)  # however late the next line is, it has not ended
             lane.cancel()
 
     try:

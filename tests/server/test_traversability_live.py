@@ -151,12 +151,19 @@ def walk() -> UwbScans:
     return scans(hill().lat_lon_from_xy(along))
 
 
-LEAD = 25
+LEAD, BEAT_S = 25, 0.06
 """Positions that are said before the scan of the first of them."""
 
 
 def _uwb(log: UwbScans, k: int, t_mono_s: float) -> Uwb:
     return Uwb(0, t_mono_s, log.intensity[k].astype("<f4").tobytes(), log.geometry.bin_m)
+
+
+async def _is_heard(page: Station, bus: Bus, log: UwbScans) -> None:
+    """Positions that are published before would be lost but for the last."""
+    lat_deg, lon_deg = log.lat_lon_deg[0].tolist()
+    bus.publish(Topic.VEHICLE, state_of(time.monotonic() - 6.5, lat_deg, lon_deg, float(log.heading_rad[0])))
+    await asyncio.to_thread(page.until, lambda m: m.type == "vehicle" and m.state is not None)
 
 
 async def scan_over_sockets(page: Station) -> None:
@@ -166,9 +173,10 @@ async def scan_over_sockets(page: Station) -> None:
     bus = await Bus.open(page.server.settings.data_dir / RUNTIME_FOLDER, "walk")
     running_agent = asyncio.ensure_future(agent.run())
     try:
-        async with asyncio.timeout(60):
+        async with asyncio.timeout(120):
             while not agent.is_ready:
                 await asyncio.sleep(0.02)
+            await _is_heard(page, bus, log)
             begun_s = time.monotonic() - 6.0
             times_s = [begun_s + t_s for t_s in log.t_s.tolist()]
             for k, t_s in enumerate(times_s):
@@ -177,10 +185,10 @@ async def scan_over_sockets(page: Station) -> None:
                 # Scans and positions come by two ways: time flies here, and a scan waits a second for its position.
                 if k >= LEAD:
                     agent.put(_uwb(log, k - LEAD, times_s[k - LEAD]))
-                await asyncio.sleep(0.02)
+                await asyncio.sleep(BEAT_S)
             for k in range(len(times_s) - LEAD, len(times_s)):
                 agent.put(_uwb(log, k, times_s[k]))
-                await asyncio.sleep(0.02)
+                await asyncio.sleep(BEAT_S)
             while agent.counts.report is None or agent.counts.report.received < len(log.t_s):
                 await asyncio.sleep(0.02)
             assert agent.counts.report.refused == 0

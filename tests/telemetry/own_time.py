@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import gc
 import selectors
 import time
 from collections.abc import Awaitable, Callable, Iterator
@@ -29,8 +30,12 @@ T = TypeVar("T")
 
 def run(whole: Callable[[], Awaitable[T]]) -> T:
     clock = _Clock()
-    with clock.told(), asyncio.Runner(loop_factory=lambda: _Loop(clock)) as runner:
-        return runner.run(bounded(whole))
+    gc.freeze()  # to look through all that other tests left would hold up a turn
+    try:
+        with clock.told(), asyncio.Runner(loop_factory=lambda: _Loop(clock)) as runner:
+            return runner.run(bounded(whole))
+    finally:
+        gc.unfreeze()
 
 
 class _Clock:

@@ -61,8 +61,8 @@ async def alone(bench: Console, mission: tuple[Item, ...]) -> str:
 
 async def refused_after(count: int, after_s: float) -> None:
     async with simulated(speedup=1.0) as (bench, simulator):
+        stranger = await asyncio.to_thread(Stranger, simulator)  # before: it waits for a heartbeat, in real time
         digest = await alone(bench, items(3))
-        stranger = await asyncio.to_thread(Stranger, simulator)
         assert await asyncio.to_thread(stranger.write, elsewhere(count)) == 0
         await asyncio.sleep(after_s)
         assert bench.status.mission_digest == digest
