@@ -12,7 +12,7 @@ from server.settings import DemoAutopilot
 from server.work.supervisor import NodeState, Supervisor
 from telemetry.bus.bus import Bus
 from telemetry.bus.liveness import START_S
-from telemetry.bus.node_lock import running_node
+from telemetry.bus.node_lock import running_node, running_nodes
 from telemetry.topics.obstacles import SENSORS, Sensor
 from telemetry.topics.recording_requests import RecorderRequest, ReplayRequest, StartRecording
 from telemetry.topics.vehicle import RadarKind
@@ -95,6 +95,12 @@ class Nodes:
     async def sensor(self, sensor: Sensor) -> None:
         """A map, regions and alerts of what one sensor sends."""
         await self.supervisor.start(sensor, [])
+
+    async def running_sensors(self) -> set[Sensor]:
+        """Those whose node runs, whoever has started it."""
+        facts = await asyncio.to_thread(running_nodes, self._runtime_dir)
+        running = {each.name for each in facts}
+        return {sensor for sensor in SENSORS if sensor in running}
 
     async def tracks(self) -> None:
         """Moving objects in what the radar sends."""

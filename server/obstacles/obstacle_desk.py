@@ -124,10 +124,11 @@ class ObstacleDesk:
         return self._live.state
 
     async def clear(self) -> None:
-        settings = self._live.settings
-        await self._live.dismiss()
-        self._set(replace(settings, clear_count=settings.clear_count + 1))
-        await self._keep(replace(self._kept, clear_count=settings.clear_count + 1))
+        """Before any node hears of it, nothing that is told counts any more."""
+        clear_count = self._live.settings.clear_count + 1
+        await self._live.dismiss(clear_count)
+        self._set(replace(self._live.settings, clear_count=clear_count))
+        await self._keep(replace(self._kept, clear_count=clear_count))
 
     async def fly(self, operator: Operator, manoeuvre_id: str) -> None:
         """Raises NotFoundError for one that is out of date, and what the link says."""

@@ -46,6 +46,7 @@ LATE_S = 2.0
 """So long after its newest part a map that is not complete is asked for."""
 DEAD_S = 3.0
 """Nodes say at least once a second how they are."""
+_UNTIL = "until the landing, or until you empty the maps"
 _NOBODY_WATCHES = {
     "blind": "Avoidance sees nothing any more: nothing brakes by itself. Pause, or steer clear yourself.",
     "lost": "Avoidance is gone with the link: nothing brakes by itself. Take the pilot's transmitter.",
@@ -82,7 +83,11 @@ class Watch:
         self.radar_look: RadarLook | None = None
         self._cloud_look: CloudLook | None = None
         self._folded_mono_s: dict[MapName, float] = {}
-        self._kept: dict[MapName, ObstacleAlert] = {}
+        self._lasting: dict[str, ObstacleAlert] = {}
+        self._begins_in_air: bool | None = None
+        """Whether this flight was under way when its vehicle was heard first; None: none was heard yet."""
+        self.awaited: set[Sensor] = set()
+        """Their nodes ran before this server, and have not spoken since."""
         self.needs_whole = {sensor: asyncio.Event() for sensor in SENSORS}
         """Set when parts of a map are missing here."""
         self.settings = PerceptionSettings()
@@ -114,6 +119,7 @@ class Watch:
         before = self.statuses.get(sensor)
         self.statuses[sensor] = status
         self._heard_mono_s[sensor] = now_s
+        self.awaited.discard(sensor)
         for name in _filled(status):
             if self.mirrors[name].origin is None:
                 self.mirrors[name].expect()
@@ -164,15 +170,21 @@ class Watch:
         self.refresh()
 
     async def on_flight(self, *, flies: bool) -> None:
-        """Whether the vehicle is armed: what was seen in a flight counts until that is over."""
+        """The vehicle is in the air, or disarmed: what was seen in a flight counts until that is over. One call at a
+        time: who tells of the vehicle waits for it."""
+        self._begins_in_air = flies and self._begins_in_air is None
         for mirror in self.mirrors.values():
             await asyncio.to_thread(mirror.on_flight, flies=flies)
+        if not flies:
+            self._ask_for_all()
         self._tell_kept()
 
-    async def dismiss(self) -> None:
-        """All maps are emptied by order, and what is kept with them."""
+    async def dismiss(self, clear_count: int) -> None:
+        """All maps are emptied by this order, and what is kept with them, whatever their nodes make of it."""
+        self._begins_in_air = None if self._begins_in_air is None else False
         for mirror in self.mirrors.values():
-            await asyncio.to_thread(mirror.dismiss)
+            await asyncio.to_thread(mirror.dismiss, clear_count)
+        self._ask_for_all()
         self._tell_kept()
 
     async def on_map(self, delta: MapDelta) -> None:
@@ -191,6 +203,10 @@ class Watch:
 
     def on_cloud_look(self, look: CloudLook) -> None:
         self._cloud_look = look
+
+    def is_silent(self, sensor: Sensor) -> bool:
+        """Its node is not heard."""
+        return self._now_mono_s() - self._heard_mono_s.get(sensor, float("-inf")) > DEAD_S
 
     def fresh_cloud(self) -> CloudLook | None:
         """What the camera sees now; a camera that has stopped sees nothing."""
@@ -237,7 +253,9 @@ class Watch:
         self.statuses.clear()
         self._heard_mono_s.clear()
         self._lost.clear()
-        self._kept.clear()
+        self._lasting.clear()
+        self._begins_in_air = None
+        self.awaited.clear()
         self._folded_mono_s.clear()
         for mirror in self.mirrors.values():
             mirror.clear()
@@ -269,19 +287,50 @@ class Watch:
         late = now_s - self._folded_mono_s.get(name, float("-inf")) > LATE_S
         return late and not self.mirrors[name].is_complete
 
+    def _ask_for_all(self) -> None:
+        """Of maps that are not here any more, and of nodes that have not spoken, nothing is waited for."""
+        self.awaited.clear()
+        for sensor in SENSORS:
+            if self.mirrors[sensor].origin is None and not self.is_silent(sensor):
+                self.needs_whole[sensor].set()
+
     def _tell_kept(self) -> None:
-        """What counts, and is drawn no more, is said."""
+        """What counts, and is drawn no more, is said; and what may not count."""
         for name in SENSORS:
-            told, mirror, now_s = self._kept.get(name), self.mirrors[name], self._now_mono_s()
-            counts = mirror.kept_count > 0 or mirror.has_forgotten
-            if counts and told is None:
-                text = f"The {name} map began anew: what it had seen counts for ways and returns until the landing."
-                told = ObstacleAlert(f"kept-{name}-{now_s:.1f}", name, "sensor", "begins", now_s, 0.0, now_s, text)
-                self._kept[name] = told
-                self._tell_own(told)
-            elif told is not None and not counts:
-                del self._kept[name]
-                self._tell_own(replace(told, phase="ends", text=f"Nothing that the {name} saw before counts any more."))
+            mirror = self.mirrors[name]
+            self._tell_lasting(
+                f"kept-{name}",
+                name,
+                f"The {name} map began anew: what it had seen counts for ways and returns {_UNTIL}.",
+                over=f"Nothing that the {name} saw before counts any more.",
+                holds=mirror.kept_count > 0,
+            )
+            self._tell_lasting(
+                f"forgot-{name}",
+                name,
+                f"Not all that the {name} had seen before its map began anew could be kept: no way and no return is"
+                f" certified {_UNTIL}.",
+                over=f"What the {name} had seen before is not waited for any more.",
+                holds=mirror.has_forgotten,
+            )
+        self._tell_lasting(
+            "start",
+            "radar",
+            "The vehicle was in the air when this server heard it first: what sensors saw before that, and have not in"
+            f" their maps any more, does not count for ways and returns {_UNTIL}.",
+            over="Nothing counts any more that sensors saw before this server heard the vehicle.",
+            holds=bool(self._begins_in_air),
+        )
+
+    def _tell_lasting(self, subject: str, sensor: Sensor, text: str, *, over: str, holds: bool) -> None:
+        told, now_s = self._lasting.get(subject), self._now_mono_s()
+        if holds and told is None:
+            told = ObstacleAlert(f"{subject}-{now_s:.1f}", sensor, "sensor", "begins", now_s, 0.0, now_s, text)
+            self._lasting[subject] = told
+            self._tell_own(told)
+        elif told is not None and not holds:
+            del self._lasting[subject]
+            self._tell_own(replace(told, phase="ends", text=over))
 
     def _tell_own(self, alert: ObstacleAlert) -> None:
         now_s = self._now_mono_s()
@@ -289,7 +338,9 @@ class Watch:
 
 
 def _filled(status: PerceptionStatus) -> list[MapName]:
-    """Maps of a sensor that are not empty, by its own word."""
+    """Maps of a sensor that are not empty, by its own word, and can be told: one that lies nowhere yet cannot."""
+    if not status.placed or status.origin is None:
+        return []
     flight = status.flight_map
     filled: list[MapName] = [status.sensor] if status.voxels_occupied else []
     if flight is not None and flight.voxels_occupied:

@@ -24,6 +24,7 @@ from server.obstacles.obstacle_desk import ObstacleDesk
 from server.obstacles.obstacle_watch import Watch
 from server.obstacles.replayed import MAPS, STATUSES, Replayed
 from server.obstacles.section import Looking
+from server.obstacles.sensed_flight import SensedFlight
 from server.obstacles.sensor_nodes import KnownGround, SensorNodes
 from server.obstacles.surroundings import Surroundings
 from server.obstacles.traffic import TrafficDesk, TrafficWatch
@@ -74,9 +75,7 @@ class Obstacles:
         around = Surroundings(library, aboard, live, self.watches["live"], self.tracks["live"])
         self._manoeuvres = Manoeuvres(around, lane, link)
         self._coming_down = ComingDown(around, link, lane, lease)
-        self._vehicle: str | None = None
-        self._flies = False
-        """The adopted one is armed. One that is out of reach flies on."""
+        self._flight = SensedFlight()
         self._ground = KnownGround(library, bus)
         self.sensor_nodes = SensorNodes(bus, nodes)
         self._drawing = MapDrawing(sights, self.watches, self._manoeuvres, self.tracks)
@@ -116,6 +115,7 @@ class Obstacles:
         ]
 
     async def start(self) -> None:
+        self.watches["live"].awaited |= await self._nodes.running_sensors()
         await self.desk.start()
         await self.traffic_desk.start()
         self.on_plan()
@@ -127,9 +127,8 @@ class Obstacles:
         self.desk.avoid_in_demo()
 
     async def on_state(self, state: VehicleState) -> None:
-        if state.armed is not self._flies:
-            self._flies = state.armed
-            await self.watches["live"].on_flight(flies=state.armed)
+        for flies in self._flight.on_state(state):
+            await self.watches["live"].on_flight(flies=flies)
 
     def tick(self) -> None:
         self._manoeuvres.tick()
@@ -139,9 +138,6 @@ class Obstacles:
         self.on_plan()
         if status.adopted is None:
             self.traffic.forget()
-        elif self._aboard.vehicle != self._vehicle:
-            self._vehicle, self._flies = self._aboard.vehicle, False
-            await self.watches["live"].on_flight(flies=False)
         await self.desk.on_link(status)
 
     def on_plan(self) -> None:

@@ -17,13 +17,14 @@ from server.obstacles.manoeuvre_situation import Situation
 from server.obstacles.moving_objects import TracksWatch
 from server.obstacles.obstacle_watch import Watch
 from server.obstacles.rest_of_plan import Underway
-from server.scene.mirror import MapMirror, Voxels
-from telemetry.topics.obstacles import SENSORS, ObstacleAlert
+from server.scene.mirror import Voxels
+from telemetry.topics.obstacles import SENSORS, ObstacleAlert, Sensor
 
 COMES_WITHIN_S, LOOK_S = 10.0, 0.02
 """The largest map that is told comes in eight seconds."""
 _UNKNOWN = "what stands in the way is not known"
 _MEANWHILE = "Until then hold, or steer clear by sight."
+_EMPTY = "It counts again after the landing, or once you empty the maps."
 
 
 async def seen_maps(watch: Watch) -> tuple[Voxels, ...]:
@@ -32,19 +33,37 @@ async def seen_maps(watch: Watch) -> tuple[Voxels, ...]:
     Raises NotReadyError where that does not come, or was too much to be kept.
     """
     until_s = time.monotonic() + COMES_WITHIN_S
-    return tuple([voxels for sensor in SENSORS for voxels in await _seen(watch.mirrors[sensor], until_s)])
+    return tuple([voxels for sensor in SENSORS for voxels in await _seen(watch, sensor, until_s)])
 
 
-async def _seen(mirror: MapMirror, until_s: float) -> tuple[Voxels, ...]:
-    while (seen := await asyncio.to_thread(mirror.seen)) is None:
+async def seen_so_far(watch: Watch) -> tuple[Voxels, ...]:
+    """What is known of it at once: for who must decide now, and certifies nothing."""
+    return tuple([v for sensor in SENSORS for v in await asyncio.to_thread(watch.mirrors[sensor].seen_so_far)])
+
+
+def are_maps_whole(watch: Watch) -> bool:
+    """Whether nothing is waited for."""
+    return not watch.awaited and all(watch.mirrors[sensor].is_complete for sensor in SENSORS)
+
+
+async def _seen(watch: Watch, sensor: Sensor, until_s: float) -> tuple[Voxels, ...]:
+    mirror = watch.mirrors[sensor]
+    while sensor in watch.awaited or (seen := await asyncio.to_thread(mirror.seen)) is None:
         if time.monotonic() > until_s:
-            what = f"Parts of the {mirror.sensor} map have been missing for {COMES_WITHIN_S:.0f} s: {_UNKNOWN}."
-            raise NotReadyError(what, where=mirror.sensor, advice=f"They are asked for; ask again. {_MEANWHILE}")
+            raise _missing(watch, sensor)
         await asyncio.sleep(LOOK_S)
     if mirror.has_forgotten:
-        what = f"The {mirror.sensor} map began anew, and not all that it had seen could be kept: {_UNKNOWN}."
-        raise NotReadyError(what, where=mirror.sensor, advice=_MEANWHILE)
+        what = f"The {sensor} map began anew, and not all that it had seen could be kept: {_UNKNOWN}."
+        raise NotReadyError(what, where=sensor, advice=f"{_EMPTY} {_MEANWHILE}")
     return seen
+
+
+def _missing(watch: Watch, sensor: Sensor) -> NotReadyError:
+    what = f"Parts of the {sensor} map have been missing for {COMES_WITHIN_S:.0f} s"
+    if watch.is_silent(sensor):
+        what = f"{what}, and its node does not run: {_UNKNOWN}."
+        return NotReadyError(what, where=sensor, advice=f"See that it is started again. {_EMPTY} {_MEANWHILE}")
+    return NotReadyError(f"{what}: {_UNKNOWN}.", where=sensor, advice=f"They are asked for; ask again. {_MEANWHILE}")
 
 
 def maps_revision(watch: Watch) -> tuple[int, ...]:
@@ -72,10 +91,11 @@ class Surroundings:
         return None if record is None or state is None else Underway(record, self.live.flight, state)
 
     async def situation(
-        self, standing: ObstacleAlert | None = None, moving: ObstacleAlert | None = None
+        self, standing: ObstacleAlert | None = None, moving: ObstacleAlert | None = None, *, at_once: bool = False
     ) -> Situation | None:
-        """None without a vehicle, its plan, or the surface model of that. Raises NotReadyError as ``seen_maps``."""
-        maps = await seen_maps(self.watch)
+        """None without a vehicle, its plan, or the surface model of that. ``at_once``: with what is known of the maps;
+        else raises NotReadyError as ``seen_maps``."""
+        maps = await (seen_so_far if at_once else seen_maps)(self.watch)
         record, state = self._aboard.record, self.live.state
         if record is None or state is None:
             return None

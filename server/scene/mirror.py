@@ -1,12 +1,12 @@
 """A copy of one sensor's map, folded from the deltas on the bus, in chunks of 32 m, for drawing and planning.
 
-What a map held when it began anew in flight is kept for planning: ``seen`` is both.
+What a map held when it began anew in flight is kept for planning: ``seen`` is both. A map that is told once more takes
+the place of the one here with its last part: a node that dies meanwhile takes nothing with it.
 """
 
 from __future__ import annotations
 
 import threading
-import time
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -20,8 +20,6 @@ ChunkKey = tuple[int, int, int]
 
 CHUNK_M = 32.0
 OCCUPIED_ABOVE = 127
-OWN_S = 5.0
-"""A map that began so short before the vehicle armed is that flight's own: a sensor may hear of the arming first."""
 DETAILS = (1, 2, 4, 8, 16)
 """Edges in voxels of what a drawn box may stand for."""
 _BITS = 20
@@ -79,15 +77,18 @@ class MapMirror:
     _kept: Kept = field(default_factory=Kept)
     _began_mono_s: float = 0.0
     """As the sensor's node says it."""
-    _began_heard_mono_s: float = float("-inf")
     _flies: bool = False
-    _is_of_flight: bool = False
-    """What is in the map was seen in this flight."""
+    _is_of_before: bool = False
+    """What is in the map was seen in a flight before."""
+    _clear_count: int = 0
+    """Of the order by which all maps were emptied last: what was told before it is void."""
     _parts_in: int = 0
     _parts: int = 0
     _lacks: bool = False
     """Something before the newest delta is missing: only the whole map mends that."""
     _chunks: dict[ChunkKey, Chunk] = field(default_factory=dict)
+    _retold: dict[ChunkKey, Chunk] | None = None
+    """Of the same map, told once more; None: it is not."""
     _dirty: set[ChunkKey] = field(default_factory=set)
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
@@ -99,26 +100,28 @@ class MapMirror:
     def clear(self) -> None:
         """As if nothing had ever been heard."""
         with self._lock:
-            self._forget()
+            self._empty()
             self._kept.forget()
-            self.origin, self.resolution_m, self.revision = None, 0.0, 0
-            self._parts_in = self._parts = 0
-            self._lacks = self._is_of_flight = False
-            self.generation += 1
             self._count()
 
     def on_flight(self, *, flies: bool) -> None:
-        """The vehicle was armed, or disarmed: what is kept is of one flight."""
+        """The vehicle is in the air, or was disarmed: what is kept is of one flight, and what never came whole in it is
+        waited for no longer."""
         with self._lock:
             if flies != self._flies:
                 self._flies = flies
-                self._is_of_flight = flies and time.monotonic() - self._began_heard_mono_s <= OWN_S
                 self._kept.forget()
+                if not flies and not self.is_complete:
+                    self._empty()
+                self._is_of_before |= not flies
                 self._count()
 
-    def dismiss(self) -> None:
-        """The operator has the map emptied: what is kept is forgotten with it."""
+    def dismiss(self, clear_count: int) -> None:
+        """The operator has all maps emptied, by the order of this number (``PerceptionSettings.clear_count``): nothing
+        counts that was told before a sensor's node heard of it."""
         with self._lock:
+            self._clear_count = clear_count
+            self._empty()
             self._kept.forget()
             self._count()
 
@@ -136,11 +139,16 @@ class MapMirror:
             raise ValueError(f"{len(keys)} keys, {len(probability)} probabilities, {len(explained)} verdicts")
         sound = (np.abs(keys) < _OFFSET).all(axis=1)
         with self._lock:
-            follows = self._follows(delta)
-            self._begin(delta)
-            self._lacks = not follows or (self._lacks and not (delta.whole and delta.part == 0))
+            if delta.clear_count < self._clear_count:
+                return True
+            follows, is_first = self._follows(delta), delta.whole and delta.part == 0
+            self._begin(delta, is_first=is_first)
+            self._lacks = not follows or (self._lacks and not is_first)
             self._parts_in, self._parts = delta.part + 1, delta.parts
             self._take(keys[sound], probability[sound], explained[sound])
+            if self._retold is not None and self.is_complete:
+                self._dirty |= self._chunks.keys() | self._retold.keys()
+                self._chunks, self._retold = self._retold, None
             self._count()
             return follows
 
@@ -169,10 +177,12 @@ class MapMirror:
         """All that is occupied, and what was seen in this flight before the map began anew; None while parts are
         missing."""
         with self._lock:
-            if not self.is_complete:
-                return None
-            now = () if self.origin is None else (self._voxels(list(self._chunks.values())),)
-            return (*now, *(self._kept_voxels(grid) for grid in self._kept.grids))
+            return self._all() if self.is_complete else None
+
+    def seen_so_far(self) -> tuple[Voxels, ...]:
+        """The same, as far as it has come."""
+        with self._lock:
+            return self._all()
 
     def boxes(self) -> tuple[int, ...]:
         """How many there would be in all, at each of ``DETAILS``."""
@@ -191,42 +201,73 @@ class MapMirror:
         self.folds += 1
         self.kept_count, self.has_forgotten = self._kept.voxel_count, self._kept.is_over_full
 
+    def _all(self) -> tuple[Voxels, ...]:
+        told = () if self.origin is None else (self._voxels(list(self._chunks.values())),)
+        again = () if self._retold is None else (self._voxels(list(self._retold.values())),)
+        return (*told, *again, *(self._kept_voxels(grid) for grid in self._kept.grids))
+
+    def _is_same_map(self, delta: MapDelta) -> bool:
+        """Whether ``delta`` is of the map that is here."""
+        here = self.origin, self.resolution_m, self._began_mono_s
+        return here == (delta.origin, delta.resolution_m, delta.began_mono_s)
+
     def _follows(self, delta: MapDelta) -> bool:
         """Whether nothing is missing between what is here and ``delta``."""
         if delta.part:
-            return delta.part == self._parts_in and delta.revision == self.revision
+            told = delta.part == self._parts_in and delta.parts == self._parts and delta.revision == self.revision
+            return told and self._is_same_map(delta)
         if delta.whole:
             return True
-        if delta.began_mono_s != self._began_mono_s:
+        if delta.began_mono_s != self._began_mono_s or not (self.origin is None or self._is_same_map(delta)):
             return False
         return self._parts_in >= self._parts and self.revision in (delta.since, delta.revision)
+
+    def _empty(self) -> None:
+        self._dirty |= self._chunks.keys()
+        self._chunks, self._retold = {}, None
+        self.origin, self.resolution_m, self.revision, self._began_mono_s = None, 0.0, 0, 0.0
+        self._parts_in = self._parts = 0
+        self._lacks = self._is_of_before = False
+        self.generation += 1
+
+    def _begin(self, delta: MapDelta, *, is_first: bool) -> None:
+        if not self._is_same_map(delta) or (is_first and delta.revision < self.revision):
+            self._begin_anew(delta)
+        elif is_first or not delta.whole:
+            self._end_retelling()
+            if is_first and delta.parts > 1:
+                self._retold = {}
+            elif is_first:
+                self._forget()
+        self.t_mono_s, self.revision = delta.t_mono_s, delta.revision
+
+    def _begin_anew(self, delta: MapDelta) -> None:
+        """Another map is told: the one that was here counts on where it was seen in this flight."""
+        if self._flies and self.origin is not None and not self._is_of_before:
+            for chunks in (self._chunks, self._retold or {}):
+                self._kept.keep((self.origin, self.resolution_m), _unexplained_ids(chunks))
+            # What is known to have been told and never came was seen, too.
+            self._kept.is_over_full |= self._lacks
+        self._forget()
+        self._retold, self._is_of_before = None, False
+        if (self.origin, self.resolution_m) != (delta.origin, delta.resolution_m):
+            self.generation += 1
+        self.origin, self.resolution_m, self._began_mono_s = delta.origin, delta.resolution_m, delta.began_mono_s
+
+    def _end_retelling(self) -> None:
+        """Its last part never came: what did counts beside what was there."""
+        retold, self._retold = self._retold or {}, None
+        for key, chunk in retold.items():
+            self._merge(self._chunks, key, chunk.ids, chunk.probability, chunk.explained)
 
     def _forget(self) -> None:
         self._dirty |= self._chunks.keys()
         self._chunks = {}
 
-    def _begin(self, delta: MapDelta) -> None:
-        is_whole = delta.whole and delta.part == 0
-        moved = self.origin != delta.origin or self.resolution_m != delta.resolution_m
-        begins = moved or delta.began_mono_s != self._began_mono_s or (is_whole and delta.revision < self.revision)
-        if begins:
-            if self._is_of_flight and self.origin is not None:
-                self._kept.keep((self.origin, self.resolution_m), self._unexplained_ids())
-            self._began_mono_s, self._began_heard_mono_s = delta.began_mono_s, time.monotonic()
-            self._is_of_flight = self._flies
-        if begins or is_whole:
-            self._forget()
-        if moved:
-            self.generation += 1
-            self.origin, self.resolution_m = delta.origin, delta.resolution_m
-        self.t_mono_s, self.revision = delta.t_mono_s, delta.revision
-
     def _take(self, keys: I32, probability: U8, explained: Bools) -> None:
         if not len(keys):
             return
-        if self._kept.grids and self.origin is not None:
-            looked = explained | (probability <= OCCUPIED_ABOVE)
-            self._kept.seen_again((self.origin, self.resolution_m), _ids(keys[looked]))
+        chunks = self._chunks if self._retold is None else self._retold
         per_chunk = max(1, round(CHUNK_M / self.resolution_m))
         place = keys // per_chunk
         chunk_ids, ids = _ids(place), _ids(keys)
@@ -234,11 +275,11 @@ class MapMirror:
         starts = np.flatnonzero(np.diff(chunk_ids[order], prepend=chunk_ids[order[0]] - 1))
         for part in np.split(order, starts[1:]):
             x, y, z = place[part[0]].tolist()
-            self._merge((x, y, z), ids[part], probability[part], explained[part])
+            self._merge(chunks, (x, y, z), ids[part], probability[part], explained[part])
 
-    def _merge(self, key: ChunkKey, ids: I64, probability: U8, explained: Bools) -> None:
+    def _merge(self, chunks: dict[ChunkKey, Chunk], key: ChunkKey, ids: I64, probability: U8, explained: Bools) -> None:
         """The delta's word on a voxel is the last."""
-        old = self._chunks.get(key)
+        old = chunks.get(key)
         if old is not None:
             kept = ~np.isin(old.ids, ids)
             ids = np.concatenate([ids, old.ids[kept]])
@@ -249,13 +290,9 @@ class MapMirror:
         chosen = occupied[first]
         self._dirty.add(key)
         if len(ids):
-            self._chunks[key] = Chunk(ids, probability[chosen], explained[chosen], _box_counts(ids))
+            chunks[key] = Chunk(ids, probability[chosen], explained[chosen], _box_counts(ids))
         else:
-            self._chunks.pop(key, None)
-
-    def _unexplained_ids(self) -> I64:
-        nothing = np.zeros(0, np.int64)
-        return np.concatenate([nothing, *(chunk.ids[~chunk.explained] for chunk in self._chunks.values())])
+            chunks.pop(key, None)
 
     def _kept_voxels(self, grid: Grid) -> Voxels:
         origin, resolution_m = grid
@@ -287,6 +324,11 @@ def coarser(voxels: Voxels, detail: int) -> Voxels:
     unexplained[where[~voxels.explained]] = True
     edge_m = voxels.resolution_m * detail
     return Voxels(_keys(ids), probability, ~unexplained, edge_m, voxels.origin, voxels.sensor)
+
+
+def _unexplained_ids(chunks: dict[ChunkKey, Chunk]) -> I64:
+    nothing = np.zeros(0, np.int64)
+    return np.concatenate([nothing, *(chunk.ids[~chunk.explained] for chunk in chunks.values())])
 
 
 def _box_counts(ids: I64) -> tuple[int, ...]:

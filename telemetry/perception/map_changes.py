@@ -34,19 +34,26 @@ class ChangeTeller:
         self._origin: MapOrigin | None = None
         self._told = _NEVER
         self._began_mono_s = 0.0
+        self._clear_count = 0
 
     def forget(self) -> None:
         """The next time the whole map is told."""
         self._told = _NEVER
 
-    def changes(self, the_map: VoxelMap, origin: MapOrigin | None, t_mono_s: float) -> list[MapDelta]:
-        """Nothing while nothing has changed, or nobody knows where the map lies."""
+    def changes(
+        self, the_map: VoxelMap, origin: MapOrigin | None, t_mono_s: float, clear_count: int = 0
+    ) -> list[MapDelta]:
+        """Nothing while nothing has changed, or nobody knows where the map lies. ``clear_count``: of the settings that
+        the map was made by; for another one it is told whole, as whoever gave that order has passed over what was told
+        before."""
         if origin is None:
             return []
         if the_map is not self._map or origin != self._origin:
             self._map, self._origin, self._told = the_map, origin, _NEVER
             # No beginning has the time of another one.
             self._began_mono_s = max(t_mono_s, self._began_mono_s + LEAST_APART_S)
+        if clear_count != self._clear_count:
+            self._clear_count, self._told = clear_count, _NEVER
         if the_map.revision == self._told:
             return []
         found = the_map.changed_since(self._told, ever_hit_only=True)
@@ -80,6 +87,7 @@ class ChangeTeller:
             explained=b"",
             since=since,
             began_mono_s=self._began_mono_s,
+            clear_count=self._clear_count,
         )
 
 

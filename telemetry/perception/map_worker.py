@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 from mapping.sensor_frames import SensorFrame
+from mapping.voxels.map import VoxelMap
 from telemetry.perception.ahead import Flight
 from telemetry.perception.frame_worker import (
     AVOIDANCE,
@@ -106,7 +107,7 @@ class MapWorker(FrameWorker):
         now_s = self._clock()
         if now_s < self._delta_s + DELTA_S:
             return
-        deltas = self._changes.changes(self.perceiver.perception.map, self._origin, self._frame_t_s or now_s)
+        deltas = self._changed(self._changes, self.perceiver.perception.map, now_s)
         self._delta_s = now_s
         if deltas:
             self._tell_map(deltas)
@@ -116,8 +117,12 @@ class MapWorker(FrameWorker):
         if flight is None or now_s < self._flight_delta_s + FLIGHT_DELTA_S:
             return
         self._flight_delta_s = now_s
-        if deltas := self._flight_changes.changes(flight.map, self._origin, self._frame_t_s or now_s):
+        if deltas := self._changed(self._flight_changes, flight.map, now_s):
             self._tell_flight_map(deltas)
+
+    def _changed(self, teller: ChangeTeller, the_map: VoxelMap, now_s: float) -> list[MapDelta]:
+        cleared = self.perceiver.settings.clear_count
+        return teller.changes(the_map, self._origin, self._frame_t_s or now_s, cleared)
 
     def _show(self, now_s: float) -> None:
         """What the newest frame showed, if there was one since."""

@@ -67,7 +67,9 @@ class MapDelta:
     """Revision that these changes were made to; who has another one asks for the whole map. Means nothing if whole."""
     began_mono_s: float = 0.0
     """Since when there is this map. Another one: it is another map, and what the one before held is not in it because
-    nobody has looked again yet. The same one may be emptied by order, or laid anew from its frames."""
+    nobody has looked again yet. The same one may be laid anew from its frames."""
+    clear_count: int = 0
+    """``PerceptionSettings.clear_count`` that its node knew of: whoever has given a later order passes this over."""
 
 
 def pack_keys(keys: NDArray[np.integer]) -> bytes:

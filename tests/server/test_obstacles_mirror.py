@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from server.scene.kept_voxels import MOST_GRIDS
 from server.scene.mirror import DETAILS, MapMirror, coarser
 from telemetry.topics.obstacles import MapOrigin
 from tests.server.obstacle_messages import ORIGIN, delta
@@ -112,53 +112,141 @@ def test_what_was_seen_in_flight_counts_when_the_map_begins_anew(again: dict[str
     assert (kept_in(mirror), mirror.kept_count) == (set(), 0)
 
 
-@pytest.mark.parametrize("looked", [{"probability": 20}, {"explained": 1}], ids=["seen free", "known ground"])
-def test_what_was_kept_is_gone_once_the_new_map_has_seen_there(looked: dict[str, Any]) -> None:
+def test_what_was_kept_stays_until_the_landing_whatever_the_new_map_sees_there() -> None:
+    """No map tells places that it only ever saw free: what is not told there says nothing."""
     mirror = in_flight()
     mirror.fold(delta([], whole=True, revision=0, began_mono_s=2.0))
-    before = mirror.folds
-    mirror.fold(delta([CRANE], since=0, revision=1, began_mono_s=2.0, **looked))
-    assert mirror.folds > before
-    assert (kept_in(mirror), mirror.kept_count) == (set(), 0)
+    for looked in ({"probability": 20}, {"explained": 1}):
+        mirror.fold(delta([CRANE], since=0, revision=1, began_mono_s=2.0, **looked))
+        assert (kept_in(mirror), mirror.kept_count) == ({CRANE}, 1)
 
 
-def test_what_the_same_map_says_is_free_and_what_is_emptied_by_order_is_not_kept() -> None:
-    told_again, emptied = in_flight(), in_flight()
-    told_again.fold(delta([], whole=True, revision=8, began_mono_s=1.0))
-    assert kept_in(told_again) == set()
-    emptied.fold(delta([], whole=True, revision=0, began_mono_s=2.0))
-    emptied.dismiss()
-    assert kept_in(emptied) == set()
-    emptied.fold(delta([CRANE], since=0, revision=9, began_mono_s=2.0))
-    emptied.fold(delta([], whole=True, revision=0, began_mono_s=3.0))
-    assert kept_in(emptied) == {CRANE}, "the order was for what was kept then"
-
-
-def test_a_flight_begins_with_nothing_whoever_hears_of_it_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The sensor's map begins anew where the vehicle arms: just before that is heard here, or after."""
-    now_s, first, later = 100.0, MapMirror("radar"), MapMirror("radar")
-    monkeypatch.setattr("server.scene.mirror.time.monotonic", lambda: now_s)
-    for mirror in (first, later):
-        mirror.fold(delta([GROUND], whole=True, began_mono_s=1.0))
-    now_s = 200.0
-    first.fold(delta([], whole=True, began_mono_s=2.0))
-    for mirror in (first, later):
-        mirror.on_flight(flies=True)
-    later.fold(delta([], whole=True, began_mono_s=2.0))
-    for mirror in (first, later):
-        assert kept_in(mirror) == set()
-        mirror.fold(delta([CRANE], since=1, revision=2, began_mono_s=2.0))
-        mirror.fold(delta([], whole=True, began_mono_s=3.0))
-        assert kept_in(mirror) == {CRANE}
-
-
-def test_more_than_can_be_kept_is_said() -> None:
+def test_what_the_same_map_says_is_free_is_not_kept() -> None:
     mirror = in_flight()
-    for number in range(MOST_GRIDS + 1):
-        assert not mirror.has_forgotten
+    mirror.fold(delta([], whole=True, revision=8, began_mono_s=1.0))
+    assert kept_in(mirror) == set()
+    mirror.fold(delta([], whole=True, revision=0, began_mono_s=2.0))
+    assert kept_in(mirror) == set()
+
+
+@pytest.mark.parametrize("answer", [{"began_mono_s": 2.0, "revision": 0}, {"began_mono_s": 1.0, "revision": 8}])
+def test_what_is_emptied_by_order_is_gone_however_the_node_answers(answer: dict[str, Any]) -> None:
+    mirror = in_flight()
+    mirror.fold(delta([(1, 1, 9)], whole=True, revision=0, began_mono_s=1.5))
+    assert kept_in(mirror) == {CRANE, (1, 1, 9)}
+    mirror.dismiss(5)
+    assert (mirror.seen(), mirror.voxel_count, mirror.kept_count) == ((), 0, 0)
+    # Told before its node heard of the order.
+    assert mirror.fold(delta([CRANE], since=7, revision=8, began_mono_s=1.5, clear_count=4))
+    assert mirror.seen() == ()
+    mirror.expect()
+    assert mirror.seen() is None, "its node has not answered yet, and holds something"
+    mirror.fold(delta([], whole=True, clear_count=5, **answer))
+    assert (kept_in(mirror), mirror.has_forgotten) == (set(), False)
+    mirror.fold(
+        delta([CRANE], since=answer["revision"], revision=9, clear_count=5, began_mono_s=answer["began_mono_s"])
+    )
+    mirror.fold(delta([], whole=True, revision=0, began_mono_s=3.0, clear_count=5))
+    assert kept_in(mirror) == {CRANE}, "the order was for what was there then"
+
+
+def test_a_map_that_is_told_again_and_breaks_off_takes_nothing_with_it() -> None:
+    mirror, other = in_flight(), (9, 9, 9)
+    mirror.fold(delta([other], whole=True, revision=7, parts=2, began_mono_s=1.0))
+    assert mirror.seen() is None
+    assert voxels_in(mirror).keys() == {CRANE, GROUND}, "what is drawn stays until the last part is there"
+    assert {tuple(k) for v in mirror.seen_so_far() for k in v.keys.tolist()} == {CRANE, GROUND, other}
+    mirror.fold(delta([], whole=True, revision=0, began_mono_s=2.0))
+    assert (kept_in(mirror), mirror.has_forgotten) == ({CRANE, other}, False)
+
+
+def test_a_map_that_is_told_again_twice_is_what_it_was_told_last() -> None:
+    mirror, other = in_flight(), (9, 9, 9)
+    mirror.fold(delta([other], whole=True, revision=7, parts=3, began_mono_s=1.0))
+    again = [delta([(k, 0, 5)], whole=True, revision=8, part=k, parts=2, began_mono_s=1.0) for k in range(2)]
+    mirror.fold(again[0])
+    assert voxels_in(mirror).keys() == {CRANE, GROUND, other}, "what came of the first try counts meanwhile"
+    mirror.taken_dirty()
+    mirror.fold(again[1])
+    assert kept_in(mirror) == {(0, 0, 5), (1, 0, 5)}
+    assert mirror.taken_dirty() == {(0, 0, 0)}
+    assert mirror.fold(delta([other], since=8, revision=9, began_mono_s=1.0))
+    assert kept_in(mirror) == {(0, 0, 5), (1, 0, 5), other}
+
+
+def test_parts_that_are_known_to_be_lost_with_their_node_are_said() -> None:
+    mirror = in_flight()
+    mirror.fold(delta([(1, 1, 9)], since=9, revision=10, began_mono_s=1.0))
+    assert mirror.seen() is None
+    mirror.fold(delta([], whole=True, revision=0, began_mono_s=2.0))
+    assert (kept_in(mirror), mirror.has_forgotten) == ({CRANE, (1, 1, 9)}, True)
+    mirror.on_flight(flies=False)
+    assert not mirror.has_forgotten
+
+
+def test_a_part_of_another_map_does_not_follow() -> None:
+    mirror = MapMirror("radar")
+    mirror.fold(delta([CRANE], whole=True, revision=3, parts=2, began_mono_s=1.0))
+    assert not mirror.fold(delta([GROUND], whole=True, revision=3, part=1, parts=2, began_mono_s=2.0))
+    assert mirror.seen() is None
+
+
+def test_a_flight_begins_in_the_air_with_nothing_kept() -> None:
+    """Arming sets home, and maps begin anew around it: who stands beside the vehicle then goes away."""
+    mirror = MapMirror("radar")
+    mirror.fold(delta([GROUND], whole=True, began_mono_s=1.0))
+    mirror.fold(delta([(1, 1, 0)], whole=True, began_mono_s=2.0))
+    mirror.fold(delta([], whole=True, began_mono_s=3.0, origin=ELSEWHERE))
+    mirror.on_flight(flies=True)
+    assert mirror.kept_count == 0
+    mirror.fold(delta([CRANE], since=1, revision=2, began_mono_s=3.0, origin=ELSEWHERE))
+    mirror.fold(delta([], whole=True, began_mono_s=4.0))
+    assert kept_in(mirror) == {CRANE}
+
+
+def test_what_was_seen_in_a_flight_before_is_not_kept_in_this_one() -> None:
+    mirror = in_flight()
+    mirror.on_flight(flies=False)
+    mirror.on_flight(flies=True)
+    mirror.fold(delta([], whole=True, revision=0, began_mono_s=2.0))
+    assert kept_in(mirror) == set()
+
+
+def test_a_map_that_never_came_whole_is_waited_for_no_longer_than_the_flight() -> None:
+    mirror = in_flight()
+    mirror.fold(delta([CRANE], whole=True, revision=8, parts=2, began_mono_s=1.0))
+    generation = mirror.generation
+    mirror.on_flight(flies=False)
+    assert (mirror.seen(), mirror.origin, mirror.generation) == ((), None, generation + 1)
+    whole = in_flight()
+    whole.on_flight(flies=False)
+    assert kept_in(whole) == {CRANE}, "what is whole may still be looked at"
+
+
+def test_maps_around_many_homes_are_kept_and_more_than_fits_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    mirror = in_flight()
+    for number in range(40):
         mirror.fold(delta([CRANE], whole=True, origin=MapOrigin(38.0, 15.0, float(number))))
+    mirror.fold(delta([(1, 1, 9)], whole=True, origin=MapOrigin(38.0, 15.0, 3.0)))
+    mirror.fold(delta([], whole=True, origin=ELSEWHERE))
+    assert (mirror.kept_count, mirror.has_forgotten) == (42, False)
+    assert mirror.seen() is not None
+    assert len(mirror.seen() or ()) == 42, "two maps around one home are one, and one is the present"
+    monkeypatch.setattr("server.scene.kept_voxels.MOST_VOXELS", 42)
     mirror.fold(delta([CRANE], whole=True, origin=ELSEWHERE))
-    assert mirror.has_forgotten
+    mirror.fold(delta([], whole=True, origin=ORIGIN))
+    assert (mirror.kept_count, mirror.has_forgotten) == (42, True)
+
+
+def test_what_is_kept_costs_no_fold_anything(monkeypatch: pytest.MonkeyPatch) -> None:
+    mirror = in_flight()
+    mirror.fold(delta([], whole=True, revision=0, began_mono_s=2.0))
+    kept = mirror._kept.grids
+    monkeypatch.setattr(np, "setdiff1d", lambda *_, **__: pytest.fail("it was looked through"))
+    monkeypatch.setattr(np, "union1d", lambda *_, **__: pytest.fail("it was looked through"))
+    before = dict(kept)
+    mirror.fold(delta([CRANE], 20, since=0, revision=1, began_mono_s=2.0))
+    assert all(kept[grid] is before[grid] for grid in before)
 
 
 PARTS = [delta([(k, 0, 0)], whole=True, revision=9, part=k, parts=3) for k in range(3)]

@@ -13,8 +13,7 @@ import pytest
 from mapping.voxels.map import VoxelMap
 from server.errors import NotReadyError
 from server.obstacles.obstacle_watch import DEAD_S, LATE_S, Watch
-from server.obstacles.surroundings import seen_maps
-from server.scene.kept_voxels import MOST_GRIDS
+from server.obstacles.surroundings import are_maps_whole, seen_maps
 from telemetry.perception.map_changes import ChangeTeller
 from telemetry.topics.obstacles import AvoidanceStatus, FlightMapStatus
 from tests.server.fakes import Told
@@ -202,12 +201,14 @@ CRANE = [(4, 0, 20)]
 def test_a_map_that_begins_anew_in_flight_is_said_and_what_it_had_seen_counts_until_the_landing() -> None:
     async def scenario() -> None:
         watch, told, _ = watching()
+        await watch.on_flight(flies=False)
         await watch.on_flight(flies=True)
         await watch.on_map(delta(CRANE, whole=True, began_mono_s=1.0))
         assert not watch.state.alerts
         await watch.on_map(delta([], whole=True, revision=0, began_mono_s=2.0))
         (began,) = [each.alert for each in watch.state.alerts]
         assert began.text.startswith("The radar map began anew: what it had seen counts")
+        assert began.text.endswith("until the landing, or until you empty the maps.")
         assert sum(len(voxels.keys) for voxels in await seen_maps(watch)) == 1
         await watch.on_flight(flies=False)
         assert [message.alert.text for message in told if message.type == "alert"][-1].startswith("Nothing that")
@@ -237,16 +238,90 @@ def test_a_map_that_is_just_being_told_is_waited_for_but_not_for_ever(monkeypatc
     asyncio.run(scenario())
 
 
-def test_what_could_not_be_kept_leaves_the_way_unknown() -> None:
+def test_what_could_not_be_kept_is_said_and_leaves_the_way_unknown_until_the_maps_are_emptied(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     async def scenario() -> None:
-        watch, _, _ = watching()
+        watch, told, _ = watching()
+        await watch.on_flight(flies=False)
         await watch.on_flight(flies=True)
-        for number in range(MOST_GRIDS + 2):
-            origin = replace(ORIGIN, alt_amsl_m=float(number))
-            await watch.on_map(delta(CRANE, whole=True, origin=origin))
+        monkeypatch.setattr("server.scene.kept_voxels.MOST_VOXELS", 0)
+        await watch.on_map(delta(CRANE, whole=True, began_mono_s=1.0))
+        await watch.on_map(delta([], whole=True, revision=0, began_mono_s=2.0))
+        (said,) = [each.alert for each in watch.state.alerts]
+        assert said.text.startswith("Not all that the radar had seen before its map began anew could be kept")
         with pytest.raises(NotReadyError, match="not all that it had seen could be kept") as refused:
             await seen_maps(watch)
+        assert refused.value.advice.startswith("It counts again after the landing, or once you empty the maps.")
         assert "steer clear" in refused.value.advice
+        await watch.dismiss(1)
+        assert [message.alert.phase for message in told if message.type == "alert"] == ["begins", "ends"]
+        assert await seen_maps(watch) == ()
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize("ends", ["landing", "emptying"])
+def test_half_a_map_of_a_node_that_does_not_come_back_blocks_no_longer_than_the_flight(
+    ends: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scenario() -> None:
+        watch, _, clock = watching()
+        monkeypatch.setattr("server.obstacles.surroundings.COMES_WITHIN_S", 0.0)
+        await watch.on_flight(flies=False)
+        await watch.on_flight(flies=True)
+        watch.on_status(status())
+        await watch.on_map(delta(CRANE, whole=True, parts=2))
+        with pytest.raises(NotReadyError) as refused:
+            await seen_maps(watch)
+        assert refused.value.advice.startswith("They are asked for; ask again.")
+        clock.now_s += DEAD_S + 0.1
+        with pytest.raises(NotReadyError, match="and its node does not run") as refused:
+            await seen_maps(watch)
+        assert "asked for" not in refused.value.advice
+        assert "once you empty the maps" in refused.value.advice
+        await (watch.on_flight(flies=False) if ends == "landing" else watch.dismiss(1))
+        assert await seen_maps(watch) == ()
+        assert not watch.needs_whole["radar"].is_set(), "nobody would answer"
+        watch.on_status(status(voxels_occupied=3))
+        assert watch.needs_whole["radar"].is_set()
+
+    asyncio.run(scenario())
+
+
+def test_maps_that_can_not_be_told_yet_are_not_waited_for() -> None:
+    """A camera whose path is not laid over the vehicle's yet; a node that knows no home."""
+    cases: list[dict[str, Any]] = [{"placed": False}, {"origin": None}]
+    for not_yet in cases:
+        watch, _, _ = watching()
+        watch.on_status(status("vision", voxels_occupied=40, flight_map=FlightMapStatus(1, 100), **not_yet))
+        assert asyncio.run(seen_maps(watch)) == ()
+        watch.on_status(status("vision", voxels_occupied=40))
+        assert watch.mirrors["vision"].seen() is None
+
+
+def test_a_server_that_begins_in_flight_waits_for_each_running_node_and_says_what_may_be_missing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def scenario() -> None:
+        watch, told, _ = watching()
+        monkeypatch.setattr("server.obstacles.surroundings.COMES_WITHIN_S", 0.0)
+        watch.awaited |= {"radar", "vision"}
+        await watch.on_flight(flies=True)
+        (said,) = [each.alert for each in watch.state.alerts]
+        assert "was in the air when this server heard it first" in said.text
+        assert not are_maps_whole(watch)
+        with pytest.raises(NotReadyError, match="Parts of the radar map"):
+            await seen_maps(watch)
+        watch.on_status(status(voxels_occupied=1))
+        watch.on_status(status("vision", voxels_occupied=0))
+        assert watch.needs_whole["radar"].is_set()
+        await watch.on_map(delta(CRANE, whole=True, revision=6, began_mono_s=1.0))
+        assert are_maps_whole(watch)
+        assert [len(voxels.keys) for voxels in await seen_maps(watch)] == [1]
+        await watch.on_flight(flies=False)
+        await watch.on_flight(flies=True)
+        assert [message.alert.phase for message in told if message.type == "alert"] == ["begins", "ends"]
 
     asyncio.run(scenario())
 
