@@ -17,7 +17,7 @@ from telemetry.topics.tracks import TracksStatus
 from telemetry.topics.vehicle import VehicleState
 
 if TYPE_CHECKING:
-    from planning.evading.way_past import NoWay
+    from planning.evading.way_past import Kind
     from telemetry.perception.mission_line import FlightLine
 
 _HANDLE = re.compile(r"[^A-Za-z0-9_.-]")
@@ -86,9 +86,9 @@ def handle_of(kind: str, alert: ObstacleAlert) -> str:
     return f"{kind}-{_HANDLE.sub('-', alert.id)}"[:80]
 
 
-def impossible(way: NoWay, alert: ObstacleAlert) -> Prepared:
-    handle = handle_of(way.kind, alert)
-    return Prepared(ManoeuvreDoc(id=handle, kind=way.kind, for_alert=alert.id, possible=False, text=way.reason))
+def impossible(kind: Kind, why: str, alert: ObstacleAlert) -> Prepared:
+    """``why``: for the pilot."""
+    return Prepared(ManoeuvreDoc(id=handle_of(kind, alert), kind=kind, for_alert=alert.id, possible=False, text=why))
 
 
 def cruise_m_s(record: PlanRecord) -> float:

@@ -37,7 +37,6 @@ NO_MISSION = "A guided way is flown, not the mission. Hold, then ask for another
 def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
     """Each possible or with the reason why not. Over and around what stands only where a mission is flown."""
     from planning.evading.manoeuvres import AvoidanceParams, around, over
-    from planning.evading.way_past import NoWay
     from server.obstacles.sidestep_task import Around, sidestepped
     from telemetry.perception.mission_line import mission_line
 
@@ -62,7 +61,7 @@ def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
         ways = [find(position, ahead.points_enu_m, seen, surface, params) for find in (over, around)]
         prepared += [_prepared(way, alert, situation, ahead, frame) for way in ways]
     if situation.alert is not None and flies_way:
-        prepared += [impossible(NoWay(kind, NO_MISSION), situation.alert) for kind in ("over", "around")]
+        prepared += [impossible(kind, NO_MISSION, situation.alert) for kind in ("over", "around")]
     if situation.approach is not None:
         prepared.append(
             sidestepped(situation, situation.approach, position, ahead, Around(seen, surface, params, frame))
@@ -130,7 +129,7 @@ def _prepared(
     from planning.evading.way_past import NoWay
 
     if isinstance(way, NoWay):
-        return impossible(way, alert)
+        return impossible(way.kind, way.reason, alert)
     speed_m_s = cruise_m_s(situation.record)
     item = ahead.item(way.leg)
     clearance_m, climb_m = min(way.seen_m, way.surface_m), float(np.ptp(way.points_enu_m[:, 2]))

@@ -10,7 +10,7 @@ import numpy as np
 
 from mapping.geometry.frames import apart_m
 from server.errors import NotFoundError, reported
-from server.obstacles.manoeuvre_situation import Prepared
+from server.obstacles.manoeuvre_situation import Prepared, impossible
 from server.obstacles.manoeuvre_task import prepare
 from server.obstacles.surroundings import Surroundings
 from server.scene.layers.region_layers import Route
@@ -23,6 +23,7 @@ from telemetry.topics.requests import FlyManoeuvre, MayFlyManoeuvre, Operator
 
 log = logging.getLogger("hedgehop.obstacles")
 
+NOTHING_KNOWN = "The plan that is flown, its surface model, or home is not known here. Hold, or steer clear by sight."
 KINDS = ("obstacle", "conflict", "approach")
 AGAIN_AFTER_S = 1.0
 """While the obstacle stands in the region: the vehicle moves, and more of it is seen."""
@@ -132,15 +133,19 @@ class Manoeuvres:
 
     async def _renew(self, standing: ObstacleAlert | None, moving: ObstacleAlert | None) -> None:
         try:
-            situation = await self._around.situation(standing, moving)
-            if situation is None or self._watch.avoidance.state == "climbing":
+            situation = await self._around.situation(standing, moving, at_once=True)
+            if self._watch.avoidance.state == "climbing":
                 self._show(())  # those on show begin where the vehicle is no more
+                return
+            if situation is None:
+                self._show(_none(NOTHING_KNOWN, standing, moving))
                 return
             self._busy("" if self.prepared else "Looking for a way past the obstacle")
             prepared = tuple([await self._allowed(each) for each in await self._lane.call(prepare, situation)])
         except Exception as error:
-            log.warning("No manoeuvre: %s", reported(error, log, "Preparing a manoeuvre").what)
-            prepared = ()
+            doc = reported(error, log, "Preparing a manoeuvre")
+            log.warning("No manoeuvre: %s", doc.what)
+            prepared = _none(doc.what, standing, moving)
         self._watch.busy = ""
         # Another alert, or none, while the worker was at it: what it found is void.
         served = self._standing is standing and self._moving is moving
@@ -169,6 +174,13 @@ class Manoeuvres:
         ]
         self._watch.manoeuvres = [each.doc for each in prepared]
         self._watch.refresh()
+
+
+def _none(why: str, standing: ObstacleAlert | None, moving: ObstacleAlert | None) -> tuple[Prepared, ...]:
+    """Why there is no way."""
+    if standing is not None:
+        return (impossible("over", why, standing),)
+    return () if moving is None else (impossible("sidestep", why, moving),)
 
 
 def _turned_rad(shown: Prepared, now: Prepared) -> float:

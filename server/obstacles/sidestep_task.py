@@ -34,15 +34,15 @@ def sidestepped(
 ) -> Prepared:
     tracks = situation.tracks
     if tracks is None:
-        return impossible(NoWay("sidestep", "Moving objects are not followed at the moment."), approach)
+        return impossible("sidestep", "Moving objects are not followed at the moment.", approach)
     proposed = _proposed(situation, tracks, around.frame)
     if isinstance(proposed, NoWay):
-        return impossible(proposed, approach)
+        return impossible(proposed.kind, proposed.reason, approach)
     # A return home is not gone on with on the mission's line.
     line = None if ahead is None or situation.flight.phase == "returning" else ahead.points_enu_m
     way = sidestep(position_enu_m, line, proposed, around.seen, around.surface, around.params)
     if isinstance(way, NoWay):
-        return impossible(way, approach)
+        return impossible(way.kind, way.reason, approach)
     return _prepared(way, tracks, situation, approach, ahead, around.frame)
 
 

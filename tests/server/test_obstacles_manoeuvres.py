@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from server.errors import NotFoundError
+from server.errors import NotFoundError, NotReadyError
 from server.obstacles import manoeuvres
 from server.obstacles.manoeuvre_situation import Prepared
 from server.obstacles.manoeuvres import Manoeuvres
@@ -49,7 +49,8 @@ class Desk:
         link: Any = SimpleNamespace(call=self._may_fly)
         self.manoeuvres = Manoeuvres(me, me, link)
 
-    async def situation(self, standing: Any, moving: Any) -> Any:
+    async def situation(self, standing: Any, moving: Any, *, at_once: bool) -> Any:
+        assert at_once, "who stands before an obstacle waits for no map"
         return self.sees(standing, moving)
 
     async def _may_fly(self, request: MayFlyManoeuvre) -> str:
@@ -133,11 +134,24 @@ def test_what_the_link_would_refuse_is_not_offered_and_its_words_are_the_reason(
 def test_a_worker_that_fails_costs_this_manoeuvre_only() -> None:
     desk = Desk(RuntimeError("broken"), (prepared(),))
     desk.manoeuvres.on_alert(alert("a"))
-    asyncio.run(desk.until(lambda: desk.asked == ["a"] and desk.watch.state.busy == ""))
-    assert desk.watch.state.manoeuvres == []
+    asyncio.run(desk.until(lambda: desk.watch.state.manoeuvres))
+    (none,) = desk.watch.state.manoeuvres
+    assert (none.for_alert, none.possible, desk.watch.state.busy) == ("a", False, "")
+    assert none.text
     desk.manoeuvres.on_alert(alert("b"))
-    asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
+    asyncio.run(desk.until(lambda: any(each.doc.possible for each in desk.manoeuvres.prepared)))
     assert desk.asked == ["a", "b"]
+
+
+@pytest.mark.parametrize(("what", "kind"), [(alert("a"), "over"), (approach(), "sidestep")])
+def test_why_nothing_can_be_offered_is_told(what: Any, kind: str) -> None:
+    desk = Desk()
+    desk.sees = lambda standing, moving: None
+    desk.manoeuvres.on_alert(what)
+    asyncio.run(desk.until(lambda: desk.watch.state.manoeuvres))
+    (none,) = desk.watch.state.manoeuvres
+    assert (none.kind, none.possible, none.text) == (kind, False, manoeuvres.NOTHING_KNOWN)
+    assert desk.asked == []
 
 
 def test_when_the_newest_is_over_the_one_before_counts() -> None:
@@ -183,8 +197,8 @@ def test_a_sidestep_that_is_not_possible_any_more_is_not_flown() -> None:
     desk = shown_with((side(5.0),), (side(5.0, "The present velocity leads into nothing.", possible=False),))
     with pytest.raises(NotAllowedError, match="leads into nothing"):
         desk.request("sidestep-t7")
-    failing = shown_with((side(5.0),), RuntimeError("broken"))
-    with pytest.raises(NotFoundError, match="out of date"):
+    failing = shown_with((side(5.0),), NotReadyError("The surface model was deleted.", advice=""))
+    with pytest.raises(NotAllowedError, match="model was deleted"):
         failing.request("sidestep-t7")
 
 
