@@ -10,13 +10,13 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from mapping.geometry.frames import LocalFrame, apart_m
-from planning.errors import PlanningError
-from server.errors import ServerError
+from planning.errors import DescribedError
 from server.obstacles.manoeuvre_situation import Situation
 from server.obstacles.rest_of_plan import Underway, rest_of_plan
 from server.scene.mirror import Voxels
 from server.schemas import PlanDoc, PoiDoc
 from server.work.jobs import Progress
+from telemetry.flight.home_watch import HomePlace
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.vehicle import VehicleState
 
@@ -47,7 +47,7 @@ def plan_rest(situation: Situation, *, report: Progress) -> RestPlanned:
     """Certified from where the vehicle is on, or the reason why it is not."""
     try:
         return _planned(situation, report)
-    except (PlanningError, ServerError) as error:
+    except DescribedError as error:
         return RestPlanned(why=error.what)
 
 
@@ -65,7 +65,7 @@ def _planned(situation: Situation, report: Progress) -> RestPlanned:
     fields = rest_of_plan("ahead", underway, terrain_id=record.terrain_id)
     fields["pois"] = _apart(fields["pois"])
     document = PlanDoc.model_validate({**document.model_dump(), **fields})
-    dsm = burned(load_planned_terrain(situation.terrain, seen_in(record)), situation.maps, state)
+    dsm = burned(load_planned_terrain(situation.terrain, seen_in(record)), situation.maps, state, situation.took_off)
     plan = plan_mission(dsm, request_from_doc(document, dsm), report=report)
     here = dsm.xy_from_lat_lon(np.array([[state.lat_deg, state.lon_deg]]))[0]
     first = int(np.argmax(np.hypot(*(plan.line.points_m[:, :2] - here).T) <= HERE_M))
@@ -88,18 +88,21 @@ def _apart(pois: list[PoiDoc]) -> list[PoiDoc]:
     return out
 
 
-def burned(dsm: Dsm, maps: tuple[Voxels, ...], state: VehicleState) -> Dsm:
-    """The model with all that was seen, and its shadow, as columns."""
+def burned(dsm: Dsm, maps: tuple[Voxels, ...], state: VehicleState, took_off: HomePlace | None) -> Dsm:
+    """The model with all that was seen, and its shadow, as columns. Raises NotAllowedError where nobody knows how high
+    that stands: each map counts its heights from the home that it was begun under, wherever that lay."""
     from planning.evading.seen import burn, columns_from_voxels
+    from telemetry.flight.home_height import home_on_ground, up_zero_m
 
-    for voxels in maps:
-        origin = voxels.origin
-        centres = voxels.centres_enu_m[~voxels.explained]
-        if origin is None or not len(centres):
-            continue
+    seen = [(map_.origin, map_.centres_enu_m[~map_.explained], map_.resolution_m) for map_ in maps]
+    stands = [(origin, centres, edge_m) for origin, centres, edge_m in seen if origin is not None and len(centres)]
+    if not stands:
+        return dsm
+    ground, home = dsm, home_on_ground([origin for origin, _, _ in stands], took_off, state)
+    for origin, centres, edge_m in stands:
         frame = LocalFrame(origin.lat_deg, origin.lon_deg, origin.alt_amsl_m)
-        home_m = float(dsm.elevation_at(dsm.xy_from_lat_lon(np.array([[origin.lat_deg, origin.lon_deg]])))[0])
-        columns = columns_from_voxels(centres, voxels.resolution_m, frame=frame, dsm=dsm, home_alt_dsm_m=home_m)
+        zero_m = up_zero_m(ground, home, origin)
+        columns = columns_from_voxels(centres, edge_m, frame=frame, dsm=dsm, home_alt_dsm_m=zero_m)
         dsm = burn(dsm, with_shadow(columns, _forward(dsm, state)))
     return dsm
 

@@ -14,7 +14,7 @@ from server.schemas import ManoeuvreDoc
 from telemetry.topics.messages import FlightStatus, GuidedTarget, PlanRecord
 from telemetry.topics.obstacles import MapOrigin, ObstacleAlert
 from telemetry.topics.tracks import TracksStatus
-from telemetry.topics.vehicle import VehicleState
+from telemetry.topics.vehicle import HomePlace, VehicleState
 
 if TYPE_CHECKING:
     from planning.evading.way_past import Kind
@@ -50,6 +50,8 @@ class Situation:
     """None unless they are of now."""
     safety_radius_m: float = 3.0
     """Kept from moving objects."""
+    took_off: HomePlace | None = None
+    """The home that the flight began with; None: not known."""
 
 
 @dataclass(frozen=True, slots=True)

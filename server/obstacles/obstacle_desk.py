@@ -32,6 +32,7 @@ from server.work.jobs import Lane
 from telemetry.bus.bus import Bus
 from telemetry.bus.link_client import LinkClient
 from telemetry.flight.avoidance.regions import braking_of
+from telemetry.flight.home_watch import home_of_takeoff
 from telemetry.perception.sensor_kinds import check_memory, check_perception
 from telemetry.topics.messages import LinkStatus, PlanRecord, Topic
 from telemetry.topics.obstacles import MAP_NAMES, MapName, PerceptionSettings, sensor_of
@@ -144,11 +145,13 @@ class ObstacleDesk:
             raise NotReadyError(
                 "Nothing was seen that the surface model does not know.", advice="Fly on, or plan as is."
             )
+        live = self._around.live
+        seen = maps, live.state, home_of_takeoff(live.track.states)
         if body.part == "whole":
-            return await self._plans.plan_with_seen(maps)
+            return await self._plans.plan_with_seen(*seen)
         part, underway = body.part, self._around.underway
         return await self._plans.plan_with_seen(
-            maps, lambda terrain_id: rest_of_plan(part, underway, terrain_id=terrain_id)
+            *seen, lambda terrain_id: rest_of_plan(part, underway, terrain_id=terrain_id)
         )
 
     async def exported(self, source: Source, name: MapName, kind: MapFormat) -> bytes:

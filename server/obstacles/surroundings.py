@@ -5,9 +5,12 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
+from mapping.geometry.arrays import F64, Bools
+from mapping.geometry.frames import LocalFrame
 from server.errors import NotReadyError
 from server.heard.channel import Channel
 from server.heard.onboard import Aboard
@@ -18,6 +21,8 @@ from server.obstacles.moving_objects import TracksWatch
 from server.obstacles.obstacle_watch import Watch
 from server.obstacles.rest_of_plan import Underway
 from server.scene.mirror import Voxels
+from telemetry.flight.home_watch import home_of_takeoff
+from telemetry.topics.deltas import packed_keys
 from telemetry.topics.obstacles import SENSORS, ObstacleAlert, Sensor
 
 COMES_WITHIN_S, LOOK_S = 10.0, 0.02
@@ -27,13 +32,15 @@ _MEANWHILE = "Until then hold, or steer clear by sight."
 _EMPTY = "It counts again after the landing, or once you empty the maps."
 
 
-async def seen_maps(watch: Watch) -> tuple[Voxels, ...]:
+async def seen_maps(watch: Watch, within_s: float | None = None) -> tuple[Voxels, ...]:
     """What each sensor has seen in this flight, all of it: a map that is just being told is waited for.
 
-    Raises NotReadyError where that does not come, or was too much to be kept.
+    Raises NotReadyError where that does not come (``within_s``; None: as long as the largest takes), or was too much to
+    be kept.
     """
-    until_s = time.monotonic() + COMES_WITHIN_S
-    return tuple([voxels for sensor in SENSORS for voxels in await _seen(watch, sensor, until_s)])
+    within_s = COMES_WITHIN_S if within_s is None else within_s
+    until_s = time.monotonic() + within_s
+    return tuple([voxels for sensor in SENSORS for voxels in await _seen(watch, sensor, until_s, within_s)])
 
 
 async def seen_so_far(watch: Watch) -> tuple[Voxels, ...]:
@@ -46,11 +53,11 @@ def are_maps_whole(watch: Watch) -> bool:
     return not watch.awaited and all(watch.mirrors[sensor].is_complete for sensor in SENSORS)
 
 
-async def _seen(watch: Watch, sensor: Sensor, until_s: float) -> tuple[Voxels, ...]:
+async def _seen(watch: Watch, sensor: Sensor, until_s: float, within_s: float) -> tuple[Voxels, ...]:
     mirror = watch.mirrors[sensor]
     while sensor in watch.awaited or (seen := await asyncio.to_thread(mirror.seen)) is None:
         if time.monotonic() > until_s:
-            raise _missing(watch, sensor)
+            raise _missing(watch, sensor, within_s)
         await asyncio.sleep(LOOK_S)
     if mirror.has_forgotten:
         what = f"The {sensor} map began anew, and not all that it had seen could be kept: {_UNKNOWN}."
@@ -58,8 +65,8 @@ async def _seen(watch: Watch, sensor: Sensor, until_s: float) -> tuple[Voxels, .
     return seen
 
 
-def _missing(watch: Watch, sensor: Sensor) -> NotReadyError:
-    what = f"Parts of the {sensor} map have been missing for {COMES_WITHIN_S:.0f} s"
+def _missing(watch: Watch, sensor: Sensor, within_s: float) -> NotReadyError:
+    what = f"Parts of the {sensor} map have been missing for {within_s:.0f} s"
     if watch.is_silent(sensor):
         what = f"{what}, and its node does not run: {_UNKNOWN}."
         return NotReadyError(what, where=sensor, advice=f"See that it is started again. {_EMPTY} {_MEANWHILE}")
@@ -78,6 +85,37 @@ def is_same_seen(one: Sequence[Voxels], other: Sequence[Voxels]) -> bool:
         and np.array_equal(a.keys[~a.explained], b.keys[~b.explained])
         for a, b in zip(one, other, strict=True)
     )
+
+
+def is_more_seen_near(
+    before: Sequence[Voxels], now: Sequence[Voxels], line_deg: Sequence[tuple[float, float]], within_m: float
+) -> bool:
+    """Whether sensors see things by now that they had not seen, and that the surface model does not explain, so near to
+    a line (lat_deg, lon_deg) over ground. For a thread, as ``is_same_seen``."""
+    lat_deg, lon_deg = np.array(line_deg).T
+    for map_ in now:
+        if (origin := map_.origin) is None:
+            continue
+        frame = LocalFrame(origin.lat_deg, origin.lon_deg, origin.alt_amsl_m)
+        line_m = frame.to_enu(lat_deg, lon_deg, origin.alt_amsl_m)[:, :2]
+        is_open = ~map_.explained
+        near = _is_near(map_.centres_enu_m[is_open][:, :2], line_m, within_m + map_.resolution_m)
+        grid = map_.sensor, origin, map_.resolution_m
+        known = [packed_keys(a.keys[~a.explained]) for a in before if (a.sensor, a.origin, a.resolution_m) == grid]
+        if not np.isin(packed_keys(map_.keys[is_open][near]), np.concatenate([np.zeros(0, np.int64), *known])).all():
+            return True
+    return False
+
+
+def _is_near(points_m: F64, line_m: F64, within_m: float) -> Bools:
+    """(N,) of (N, 2) points and a line (K, 2)."""
+    near = ((points_m >= line_m.min(axis=0) - within_m) & (points_m <= line_m.max(axis=0) + within_m)).all(axis=1)
+    among, is_near = points_m[near], np.zeros(int(near.sum()), np.bool_)
+    for a, b in pairwise(line_m if len(line_m) > 1 else np.vstack([line_m, line_m])):
+        share = np.clip((among - a) @ (b - a) / max(float((b - a) @ (b - a)), 1e-9), 0.0, 1.0)
+        is_near |= np.hypot(*(among - a - share[:, None] * (b - a)).T) <= within_m
+    near[near] = is_near
+    return near
 
 
 class Surroundings:
@@ -123,4 +161,5 @@ class Surroundings:
             approach=moving,
             tracks=tracks,
             safety_radius_m=watch.settings.safety_radius_m,
+            took_off=home_of_takeoff(self.live.track.states),
         )

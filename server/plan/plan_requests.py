@@ -26,6 +26,7 @@ from server.plan.plan_desk import PlanDesk
 from server.scene.mirror import Voxels
 from server.schemas import Imported, Pages, PlanDoc, PlanEdit, PlanState
 from server.work.jobs import Lane
+from telemetry.topics.vehicle import HomePlace, VehicleState
 
 ALL = "all.zip"
 MOST_POINTS = 1000
@@ -122,17 +123,23 @@ class PlanRequests:
         return await asyncio.to_thread(written_fence, self._desk.document, file)
 
     async def plan_with_seen(
-        self, maps: list[Voxels], rest: Callable[[str], dict[str, Any]] | None = None
+        self,
+        maps: list[Voxels],
+        state: VehicleState | None,
+        took_off: HomePlace | None,
+        rest: Callable[[str], dict[str, Any]] | None = None,
     ) -> PlanState:
         """Raises the open plan's surface model where the maps have unexplained voxels; an edit like any other.
 
-        ``rest`` gives, of the terrain's id, the fields of a plan that begins where the vehicle is.
+        ``state`` and ``took_off`` are the vehicle's, as in ``keep_seen``; ``rest`` gives, of the terrain's id, the
+        fields of a plan that begins where the vehicle is.
         """
         terrain_id = self._desk.document.terrain_id
         if terrain_id is None:
             raise NotReadyError("There is no surface model to add to.", advice="Open the plan that is flown.")
         fields = {} if rest is None else await asyncio.to_thread(rest, terrain_id)
-        fields["seen_id"] = await self._lane.call(tasks.keep_seen, self._library.terrain_dir(terrain_id), maps)
+        directory = self._library.terrain_dir(terrain_id)
+        fields["seen_id"] = await self._lane.call(tasks.keep_seen, directory, maps, state, took_off)
         await self._desk.propose(lambda document: ("Plan against what was seen", document.model_copy(update=fields)))
         return self.state
 

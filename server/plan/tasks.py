@@ -57,6 +57,7 @@ from server.schemas import (
 )
 from server.work.clocks import READ_STEP, StepTimer
 from server.work.jobs import Progress
+from telemetry.topics.vehicle import HomePlace, VehicleState
 
 PATH_TOLERANCE_M = 0.02
 """Between the path and the line that is drawn."""
@@ -282,18 +283,31 @@ def plan_scene(plan: Plan) -> PlanScene:
     )
 
 
-def keep_seen(directory: Path, maps: list[Voxels], *, report: Progress) -> str:
+def keep_seen(
+    directory: Path,
+    maps: list[Voxels],
+    state: VehicleState | None = None,
+    took_off: HomePlace | None = None,
+    *,
+    report: Progress,
+) -> str:
     """Makes columns of what the maps do not explain; the id under which they are kept beside the model.
 
-    Raises NotReadyError.
+    ``state``: of the vehicle that has seen it, ``took_off``: home that its flight began with; without a vehicle maps
+    were begun under a home on the ground. Raises NotReadyError, and NotAllowedError where nobody knows how high it is.
     """
+    from telemetry.flight.home_height import home_on_ground, up_zero_m
+
     report("Taking in what was seen", None)
     dsm = load_terrain(directory)
+    origins = [voxels.origin for voxels in maps if voxels.origin is not None]
+    home = None if state is None else home_on_ground(origins, took_off, state)
     columns = []
     for voxels in maps:
         origin = voxels.origin
         assert origin is not None
-        home_m = float(dsm.elevation_at(dsm.xy_from_lat_lon(np.array([[origin.lat_deg, origin.lon_deg]])))[0])
+        under = home or HomePlace(origin.lat_deg, origin.lon_deg, origin.alt_amsl_m)
+        home_m = float(dsm.elevation_at(dsm.xy_from_lat_lon(np.array([[under.lat_deg, under.lon_deg]])))[0])
         if not np.isfinite(home_m):
             raise NotReadyError(
                 "The vehicle took off where this plan's surface model knows nothing.",
@@ -301,5 +315,6 @@ def keep_seen(directory: Path, maps: list[Voxels], *, report: Progress) -> str:
             )
         frame = LocalFrame(origin.lat_deg, origin.lon_deg, origin.alt_amsl_m)
         centres = voxels.centres_enu_m[~voxels.explained]
-        columns.append(columns_from_voxels(centres, voxels.resolution_m, frame=frame, dsm=dsm, home_alt_dsm_m=home_m))
+        zero_m = up_zero_m(dsm, under, origin)
+        columns.append(columns_from_voxels(centres, voxels.resolution_m, frame=frame, dsm=dsm, home_alt_dsm_m=zero_m))
     return store_seen(directory, SeenColumns(tuple(columns)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -10,8 +11,9 @@ from mapping.geometry.frames import apart_m
 from planning.terrain.dsm import SurfaceModel
 from planning.terrain.vertical_datum import is_amsl
 from telemetry.errors import NotAllowedError
-from telemetry.flight.home_watch import MOVED_M, HomePlace, home_of
+from telemetry.flight.home_watch import MOVED_M, HomePlace, home_of, is_there
 from telemetry.flight.preflight.preflight import LARGEST_SHIFT_M
+from telemetry.topics.obstacles import MapOrigin
 from telemetry.topics.vehicle import VehicleState
 
 LARGEST_DOUBT_M = 2.0
@@ -43,6 +45,36 @@ def home_off_m(ground: SurfaceModel, took_off: HomePlace | None, state: VehicleS
         what = f"Home was moved in flight to a height that is {far} of the surface model there."
         raise NotAllowedError(what, where="home", advice="Set home here or there: it then lies on the ground again.")
     return off_m
+
+
+def home_on_ground(origins: Sequence[MapOrigin], took_off: HomePlace | None, state: VehicleState) -> HomePlace:
+    """A home that lies on the surface model's ground, from which maps of these origins are laid on the model.
+
+    Home of the take-off; where that is not known, home as it is now. Raises NotAllowedError where a map was begun
+    under another one then: by how much that lay higher than the ground nobody knows.
+    """
+    if took_off is not None:
+        return took_off
+    now = home_of(state)
+    if now is None:
+        what = "The vehicle does not tell its home: how high things stand that were seen is not known."
+        raise NotAllowedError(what, where="home", advice="Wait for it.")
+    if not all(is_there(HomePlace(each.lat_deg, each.lon_deg, each.alt_amsl_m), now) for each in origins):
+        what = "Things were seen under another home, and home of the take-off was not heard here: how high they stand"
+        raise NotAllowedError(f"{what} is not known.", where="home", advice="Steer clear by sight, and land.")
+    return now
+
+
+def up_zero_m(ground: SurfaceModel, home: HomePlace, origin: MapOrigin) -> float:
+    """Height in the model of a map's up = 0, which counts from the home that the map was begun under.
+
+    ``home``: one that lies on the ground. Raises NotAllowedError where the model does not know that place.
+    """
+    ground_m = _ground_m(ground, home)
+    if not math.isfinite(ground_m):
+        what = "The surface model knows no height where the vehicle took off: how high things stand is not known."
+        raise NotAllowedError(what, where="home", advice="Open the model that the flight began over.")
+    return ground_m + origin.alt_amsl_m - home.alt_amsl_m
 
 
 def _by_its_receiver_m(ground: SurfaceModel, home: HomePlace, state: VehicleState) -> float:

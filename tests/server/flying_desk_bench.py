@@ -17,6 +17,7 @@ from server.flying.in_flight.take_up_desk import TakingUp
 from server.flying.work import FlightWork
 from server.heard.onboard import Aboard
 from server.library import Library
+from server.obstacles.obstacle_watch import Watch
 from server.plan import demo, tasks
 from server.plan.file_tasks import make_demo_terrain
 from server.schemas import Computation, FlyState, PlanDoc, PlanState, ServerMessage
@@ -25,10 +26,10 @@ from telemetry.errors import SilentError, TransferError
 from telemetry.mavlink.verify import as_stored, compare, digest
 from telemetry.topics.checklist import ChecklistRecord
 from telemetry.topics.messages import Candidate, LinkStatus, PlanRecord, Topic
-from telemetry.topics.obstacles import AvoidanceStatus
 from telemetry.topics.onboard_lists import OnboardMission, UploadReport
 from telemetry.topics.requests import Download, DownloadPlaces, Operator, ReadParameters, Upload, UploadPlaces
 from telemetry.topics.vehicle import VehicleState
+from tests.server.fakes import Told
 
 ME = Operator("Anna", 7)
 
@@ -159,7 +160,7 @@ class Bench:
         self.made, self.vehicle, self.plan = made, Vehicle(), made.plan()
         self.plan_lane = lanes[0]
         self.live = Live(made.standing())
-        self.watch = SimpleNamespace(avoidance=AvoidanceStatus())
+        self.watch = Watch("live", Told())
         self.told: list[FlyState] = []
         self.records: list[PlanRecord] = []
         self.lists: list[ChecklistRecord] = []

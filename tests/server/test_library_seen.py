@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,9 @@ from server.library.seen_columns import check_home_stands_on_ground, load_planne
 from server.library.terrains import store_terrain
 from server.plan.tasks import keep_seen
 from server.scene.mirror import MapMirror, Voxels
+from telemetry.errors import NotAllowedError
 from telemetry.topics.obstacles import MapOrigin
+from telemetry.topics.vehicle import HomePlace, VehicleState
 from tests.server.obstacle_messages import delta
 from tests.server.scene_fixtures import hill
 
@@ -54,6 +57,22 @@ def test_a_mast_raises_its_cells_and_known_ground_raises_none(terrain: tuple[Dsm
     assert (raised.elevation_m[known] >= dsm.elevation_m[known]).all()
     assert load_seen(directory, seen_id).count == 9
     assert load_planned_terrain(directory, None).elevation_m.tobytes() == dsm.elevation_m.tobytes()
+
+
+def test_a_map_of_another_home_stands_as_high_as_by_that_of_the_take_off(terrain: tuple[Dsm, Path]) -> None:
+    """Its origin tells 500 m above the sea; the vehicle took off 4 m below that."""
+    dsm, directory = terrain
+    lat_deg, lon_deg = dsm.lat_lon_from_xy(HOME_XY)[0].tolist()
+    told = {"home_lat_deg": lat_deg, "home_lon_deg": lon_deg, "home_alt_amsl_m": 500.0}
+    state, took_off = VehicleState(1, 1, **told), HomePlace(lat_deg, lon_deg, 496.0)
+    tops = [
+        load_planned_terrain(directory, keep_seen(directory, [seen_map(dsm)], state, home, report=quiet))
+        for home in (None, took_off)
+    ]
+    low_m, high_m = (float(each.elevation_at(MAST_XY)[0]) for each in tops)
+    assert high_m - low_m == pytest.approx(4.0)
+    with pytest.raises(NotAllowedError, match="seen under another home"):
+        keep_seen(directory, [seen_map(dsm)], replace(state, home_alt_amsl_m=496.0), None, report=quiet)
 
 
 def test_a_home_on_what_was_seen_is_refused(terrain: tuple[Dsm, Path]) -> None:

@@ -20,12 +20,15 @@ from server.obstacles.coming_down import ComingDown
 from server.obstacles.coming_down_task import SHADOW_M, RestPlanned, burned, plan_rest, with_shadow
 from server.obstacles.manoeuvre_situation import Situation
 from server.obstacles.obstacle_watch import Watch
+from server.scene.mirror import MapMirror
 from server.schemas import PlanDoc, SurfaceDoc
 from telemetry.errors import NotAllowedError
 from telemetry.topics.messages import GuidedTarget, PlanRecord
-from telemetry.topics.obstacles import AvoidanceStatus, PerceptionSettings
+from telemetry.topics.obstacles import AvoidanceStatus, MapOrigin, PerceptionSettings
 from telemetry.topics.requests import FlyRest, Operator
+from telemetry.topics.vehicle import HomePlace, VehicleState
 from tests.server.fakes import Told
+from tests.server.obstacle_messages import delta
 from tests.server.test_obstacles_manoeuvre_task import planned, situation  # noqa: F401
 
 Planned = tuple[Dsm, PlanRecord, Path]
@@ -44,14 +47,15 @@ def underway(there: Situation) -> Situation:
         surface=SurfaceDoc(radius_m=4.0, height_m=3.0),
     )
     record = replace(there.record, plan_json=document.model_dump_json())
-    return replace(there, state=state, height_offset_m=12.0, record=record)
+    took_off = HomePlace(there.origin.lat_deg, there.origin.lon_deg, there.origin.alt_amsl_m)
+    return replace(there, state=state, height_offset_m=12.0, record=record, took_off=took_off)
 
 
 def test_the_rest_is_planned_over_the_wall_and_its_shadow_and_down_to_its_proper_height(planned: Planned) -> None:  # noqa: F811
     there = underway(situation(planned, 6))
     rest = rest_of(there)
     assert rest.why == ""
-    model = burned(planned[0], there.maps, there.state)
+    model = burned(planned[0], there.maps, there.state, there.took_off)
     mission = read_wpl(there.record.mission_wpl)
     places = model.xy_from_lat_lon(np.array([[t.lat_deg, t.lon_deg] for t in rest.targets]))
     ups = np.array([t.alt_rel_home_m for t in rest.targets])
@@ -82,6 +86,52 @@ def test_what_cannot_be_certified_stays_higher_and_says_why(planned: Planned) ->
     lost = replace(there, state=replace(there.state, lat_deg=0.0, lon_deg=0.0))
     assert rest_of(lost).targets == ()
     assert rest_of(lost).why
+
+
+HOME_M = 900.0
+
+
+@pytest.mark.parametrize("home_up_m", [30.0, 1.2, 0.0, -1.2], ids=["set at the vehicle", "up", "as it was", "down"])
+def test_what_was_seen_stands_as_high_whichever_home_its_map_was_begun_under(
+    planned: Planned,  # noqa: F811
+    home_up_m: float,
+) -> None:
+    """A crane 25 m high. Its map counts from a home that lies so much above the ground, or below it."""
+    dsm = planned[0]
+    here, there = (dsm.lat_lon_from_xy(np.array([[x, 3_999_945.0]]))[0].tolist() for x in (500_008.0, 500_020.0))
+    took_off = HomePlace(here[0], here[1], HOME_M)
+    origin = MapOrigin(here[0], here[1], HOME_M + home_up_m)
+    crane_xy = np.array([[500_038.5, 3_999_945.5]])
+    ground_m = float(dsm.elevation_at(dsm.xy_from_lat_lon(np.array([here])))[0])
+    mirror = MapMirror("vision")
+    top = int(np.floor(24.5 - home_up_m))
+    mirror.fold(delta([(30, 0, up) for up in range(top - 5, top + 1)], origin=origin, whole=True))
+    state = VehicleState(1, 1, armed=True, landed="in_air", lat_deg=there[0], lon_deg=there[1])
+    for now_m in (HOME_M, HOME_M + home_up_m):  # set back since, or not
+        now = replace(state, home_lat_deg=here[0], home_lon_deg=here[1], home_alt_amsl_m=now_m)
+        model = burned(dsm, (mirror.voxels(),), now, took_off)
+        over_m = float(model.elevation_at(crane_xy)[0]) - ground_m
+        assert 25.0 <= over_m <= 26.5, f"it stands {over_m:.1f} m high"
+
+
+def test_how_high_things_stand_that_were_seen_under_another_home_is_refused_where_the_take_off_was_not_heard(
+    planned: Planned,  # noqa: F811
+) -> None:
+    there = underway(situation(planned, 6))
+    lat_deg, lon_deg = there.origin.lat_deg, there.origin.lon_deg
+    told = {"home_lat_deg": lat_deg, "home_lon_deg": lon_deg, "home_alt_amsl_m": there.origin.alt_amsl_m}
+    same = replace(there.state, **told)
+    heard = burned(planned[0], there.maps, same, there.took_off)
+    assert np.array_equal(burned(planned[0], there.maps, same, None).elevation_m, heard.elevation_m, equal_nan=True)
+    moved = replace(same, home_alt_amsl_m=there.origin.alt_amsl_m - 0.6)
+    with pytest.raises(NotAllowedError, match="seen under another home"):
+        burned(planned[0], there.maps, moved, None)
+    assert "seen under another home" in rest_of(replace(there, state=moved, took_off=None)).why
+    with pytest.raises(NotAllowedError, match="does not tell its home"):
+        burned(planned[0], there.maps, there.state, None)
+    with pytest.raises(NotAllowedError, match="no height where the vehicle took off"):
+        burned(planned[0], there.maps, same, HomePlace(lat_deg + 1.0, lon_deg, 900.0))
+    assert burned(planned[0], (), there.state, None) is planned[0]
 
 
 def test_a_shadow_is_as_high_as_what_casts_it_and_lies_ahead() -> None:

@@ -25,13 +25,11 @@ from server.errors import (
 from server.flying.apart.other_vehicles import PENDING
 from server.flying.in_flight import take_up_desk
 from server.heard.onboard import onboard
-from server.scene.mirror import MapMirror
 from server.schemas import CheckRow, TakeUpPlan
 from server.work.jobs import Lane, Progress
 from telemetry.errors import NotAllowedError, SilentError, TransferError
 from telemetry.mavlink.items import wire_items
 from telemetry.topics.messages import FlightStatus
-from telemetry.topics.obstacles import SENSORS
 from telemetry.topics.requests import Pause, Resume, TakeUp
 from telemetry.topics.vehicle import VehicleState
 from tests.server.flying_desk_bench import ME, Bench, Made
@@ -68,7 +66,6 @@ async def flown(made: Made, tmp_path: Path, lanes: tuple[Lane, Lane], **more: An
     bench.vehicle.told.clear()
     bench.live.state = hovering(made, **more)
     bench.live.track.states = [made.standing(), bench.live.state]
-    bench.watch.mirrors = {name: MapMirror(name) for name in SENSORS}
     return bench
 
 

@@ -34,7 +34,10 @@ def judge_home(asked: WayAsked, place: tuple[float, float] | None, *, report: Pr
     home = _home_at(asked, place)
     if not is_in_the_air(asked.state):
         return HomeJudged(home, None)
-    return HomeJudged(home, judge_return(replace(asked, state=_with_home(asked.state, home)), report=report))
+    # Without a take-off that was heard, home as it is now was found to lie on the ground.
+    took_off = asked.took_off or home_of(asked.state)
+    there = replace(asked, state=_with_home(asked.state, home), took_off=took_off)
+    return HomeJudged(home, judge_return(there, report=report))
 
 
 def judge_return(asked: WayAsked, *, report: Progress) -> ReturnDoc:

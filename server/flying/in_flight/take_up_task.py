@@ -193,8 +193,9 @@ def _flown(asked: AskedTakeUp, over: FlownOver, aboard: PlacesOnboard) -> Flown:
 def _over(asked: AskedTakeUp) -> FlownOver:
     from telemetry.flight.taking_up import FlownOver
 
-    ground = load_terrain(asked.directory)
-    return FlownOver(ground, with_seen(ground, asked.directory, asked.document.seen_id, asked.maps, asked.state))
+    ground, seen_id = load_terrain(asked.directory), asked.document.seen_id
+    seen = with_seen(ground, asked.directory, seen_id, asked.maps, asked.state, asked.took_off)
+    return FlownOver(ground, seen)
 
 
 def _doc(found: TakenUp, list_notes: list[str]) -> TakenUpDoc:

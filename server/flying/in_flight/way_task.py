@@ -76,7 +76,7 @@ def judge_way(asked: WayAsked, *, report: Progress) -> WayJudged:
     speed_m_s = asked.body.speed_m_s or demands.profile.mean_speed_m_s
     ground = load_terrain(asked.terrain)
     off_m = home_off_m(ground, asked.took_off, asked.state) if is_in_the_air(asked.state) else 0.0
-    seen = with_seen(ground, asked.terrain, asked.document.seen_id, asked.maps, asked.state)
+    seen = with_seen(ground, asked.terrain, asked.document.seen_id, asked.maps, asked.state, asked.took_off)
     way = judged_way(
         part_for(ground, asked.state, wish, rally),
         None if seen is None else part_for(seen, asked.state, wish, rally),
@@ -97,16 +97,21 @@ def judge_way(asked: WayAsked, *, report: Progress) -> WayJudged:
 
 
 def with_seen(
-    ground: Dsm, terrain: Path, seen_id: str | None, maps: tuple[Voxels, ...], state: VehicleState
+    ground: Dsm,
+    terrain: Path,
+    seen_id: str | None,
+    maps: tuple[Voxels, ...],
+    state: VehicleState,
+    took_off: HomePlace | None,
 ) -> Dsm | None:
-    """None where nothing was seen, neither in this flight nor in the plan."""
+    """None where nothing was seen, neither in this flight nor in the plan. Raises NotAllowedError as ``burned``."""
     from server.library.seen_columns import load_planned_terrain
     from server.obstacles.coming_down_task import burned
 
     if seen_id is None and not any((~voxels.explained).any() for voxels in maps):
         return None
     planned = ground if seen_id is None else load_planned_terrain(terrain, seen_id)
-    return burned(planned, maps, state)
+    return burned(planned, maps, state, took_off)
 
 
 def wish_of(body: WayBody, flown: tuple[tuple[float, float, float], ...]) -> Wish:
