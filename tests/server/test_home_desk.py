@@ -18,7 +18,7 @@ from server.flying.in_flight import home_desk
 from server.flying.in_flight.home_desk import HomeDesk
 from server.flying.in_flight.way_desk import WayDesk
 from server.heard.channel import Channel
-from server.scene.mirror import MapMirror
+from server.obstacles.obstacle_watch import Watch
 from server.schemas import HomeAskedDoc, HomeBody, HomeState, ReturnDoc, SetHomeBody
 from server.schemas.flight_docs import CHECK_FRESH_S
 from server.work.jobs import Lane
@@ -26,7 +26,7 @@ from telemetry.bus.bus import Bus
 from telemetry.errors import NotAllowedError
 from telemetry.flight.home_watch import home_of
 from telemetry.topics.messages import ServerAlive, Topic, VehicleText
-from telemetry.topics.obstacles import SENSORS, MapOrigin
+from telemetry.topics.obstacles import MapOrigin
 from telemetry.topics.requests import SetHome
 from telemetry.topics.vehicle import VehicleState
 from tests.server.fakes import Told
@@ -52,10 +52,10 @@ class Bench:
         flies = {"armed": True, "landed": "in_air", "alt_rel_home_m": up_m} if up_m else {}
         self.live.state = replace(stands, position_t_mono_s=now_s, gnss_t_mono_s=now_s, **flies)
         self.live.track.states = [stands, self.live.state]
-        self.mirrors = {name: MapMirror(name) for name in SENSORS}
-        for mirror in self.mirrors.values():
+        self.watch = Watch("live", Told())
+        for mirror in self.watch.mirrors.values():
             mirror.on_flight(flies=up_m > 0.0)
-        ways = WayDesk(me.vehicle, self.live, me, made.library, lane, me, Told())
+        ways = WayDesk(me.vehicle, self.live, me, made.library, lane, self.watch, Told())
         self.sets = 0
         self.said: list[str] = []
         on: Any = bus or SimpleNamespace(publish=self.hears)
@@ -260,7 +260,7 @@ def test_a_certified_return_is_judged_again_where_sensors_see_something_in_its_w
         monkeypatch.setattr(home_desk, "NEW_MAP_S", 0.0)
         monkeypatch.setattr(home_desk, "LOOK_EVERY_S", 0.02)
         bench = Bench(made, lane)
-        radar = bench.mirrors["radar"]
+        radar = bench.watch.mirrors["radar"]
         home = home_of(bench.state)
         assert home is not None
         origin = MapOrigin(home.lat_deg, home.lon_deg, home.alt_amsl_m)
@@ -301,12 +301,76 @@ def test_a_certified_return_is_judged_again_where_sensors_see_something_in_its_w
             await shows(lambda: bench.desk._judged and bench.desk._judged.maps[0] == radar.folds)
             assert bench.desk.state.ret is not None
             assert bench.desk.state.ret.state == "not_certified"
-            # The radar looks there again, and sees nothing.
+            # The radar looks there again, and sees nothing: that frees nothing. The operator empties the maps.
             radar.fold(delta(mast, 20, whole=True, revision=1, origin=origin, resolution_m=1.0, began_mono_s=70.0))
+            await shows(lambda: bench.desk._judged and bench.desk._judged.maps[0] == radar.folds)
+            assert bench.desk.state.ret.state == "not_certified"
+            await bench.watch.dismiss(1)
             await shows(lambda: bench.desk.state.ret and bench.desk.state.ret.state == "certified")
             assert len(bench.said) == 1
         finally:
             judging.cancel()
+
+    runner.run(scenario())
+
+
+def test_while_parts_of_a_map_are_missing_the_return_is_unknown_at_once_and_judged_once_they_are_there(
+    made: Made, lane: Lane, runner: asyncio.Runner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scenario() -> None:
+        monkeypatch.setattr(home_desk, "LOOK_EVERY_S", 0.02)
+        bench = Bench(made, lane)
+        radar, home = bench.watch.mirrors["radar"], home_of(bench.state)
+        assert home is not None
+        origin = MapOrigin(home.lat_deg, home.lon_deg, home.alt_amsl_m)
+        aside = delta([(-300, -300, 0)], whole=True, origin=origin, parts=2)
+        judging = asyncio.ensure_future(bench.desk.run())
+        try:
+            bench.desk.on_state(bench.state)
+            bench.moves(20.0)
+            await shows(lambda: bench.desk.state.ret and not bench.desk.state.is_judging_return)
+            radar.fold(aside)
+            await shows(lambda: bench.desk.state.ret and bench.desk.state.ret.state == "unknown")
+            assert bench.desk.state.ret is not None
+            assert bench.desk.state.ret.reasons[0].text.startswith("Parts of a map are missing")
+            assert bench.desk.state.is_judging_return, "it waits for them"
+            assert bench.said == []
+            radar.fold(replace(aside, part=1))
+            await shows(lambda: bench.desk.state.ret and bench.desk.state.ret.state == "certified")
+            # What never comes leaves it unknown, and that is said.
+            monkeypatch.setattr("server.obstacles.surroundings.COMES_WITHIN_S", 0.0)
+            radar.fold(replace(aside, revision=2))
+            await shows(lambda: bench.said)
+            assert "Parts of the radar map have been missing" in bench.said[0]
+            radar.fold(replace(aside, revision=2, part=1))
+            await shows(lambda: bench.desk.state.ret and bench.desk.state.ret.state == "certified")
+        finally:
+            judging.cancel()
+
+    runner.run(scenario())
+
+
+def test_what_was_waited_for_is_no_time_of_the_worker(
+    made: Made, lane: Lane, runner: asyncio.Runner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scenario() -> None:
+        bench, now_s = Bench(made, lane), [time.monotonic()]
+        monkeypatch.setattr("server.flying.in_flight.home_desk.time.monotonic", lambda: now_s[0])
+        asked = await bench.desk._ways.asked(ME, home_desk.ANYWHERE)
+
+        async def renewed(_: object) -> Any:
+            now_s[0] += 9.0
+            return asked
+
+        async def call(*_: object) -> ReturnDoc:
+            now_s[0] += 2.0
+            return ReturnDoc(state="certified", reasons=[], judged_mono_s=now_s[0])
+
+        monkeypatch.setattr(bench.desk._ways, "renewed", renewed)
+        monkeypatch.setattr(bench.desk, "_lane", SimpleNamespace(call=call))
+        await bench.desk._judge_return()
+        assert bench.desk._judged is not None
+        assert bench.desk._judged.took_s == pytest.approx(2.0)
 
     runner.run(scenario())
 

@@ -15,17 +15,19 @@ from planning.errors import ParameterError
 from planning.fence.fence_model import Fence, circle
 from planning.formats.fence_items import fence_items
 from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotFoundError, NotReadyError
+from server.flying.in_flight import way_desk
 from server.flying.in_flight.way_desk import WayDesk, flown_places
 from server.flying.in_flight.way_task import WayJudged, wish_of
 from server.heard.channel import Channel, ShownWay
-from server.scene.mirror import MapMirror
+from server.obstacles.obstacle_watch import Watch
+from server.obstacles.surroundings import is_more_seen_near
 from server.schemas import FenceDoc, FlyWayBody, GuidedState, PlaceDoc, WayBody, WayDoc, WaySpeedBody
 from server.schemas.flight_docs import CHECK_FRESH_S
 from server.work.jobs import Lane
 from telemetry.errors import NotAllowedError, NoVehicleError
 from telemetry.mavlink.items import wire_items
 from telemetry.topics.messages import FlightStatus
-from telemetry.topics.obstacles import SENSORS, MapOrigin
+from telemetry.topics.obstacles import MapOrigin
 from telemetry.topics.requests import FlyWay, SetSpeed, StartGuided
 from telemetry.topics.vehicle import VehicleState
 from tests.server.fakes import Told
@@ -48,8 +50,8 @@ class Bench:
         me: Any = self
         self.live = Channel("live", Told())
         self.hovers(made.standing(), up_m)
-        self.mirrors = {name: MapMirror(name) for name in SENSORS}
-        self.desk = WayDesk(me.vehicle, self.live, me, made.library, lane, me, me)
+        self.watch = Watch("live", Told())
+        self.desk = WayDesk(me.vehicle, self.live, me, made.library, lane, self.watch, me)
 
     def publish(self, message: Any) -> None:
         self.told.append(message.guided)
@@ -181,12 +183,14 @@ def test_what_a_sensor_has_seen_is_in_the_model_that_is_judged(made: Made, lane:
         assert state.home_alt_amsl_m is not None
         origin = MapOrigin(*made.home, state.home_alt_amsl_m)
         wall = [(15, north, 34) for north in range(-20, 20)]
-        radar = bench.mirrors["radar"]
+        radar = bench.watch.mirrors["radar"]
         radar.on_flight(flies=True)
         radar.fold(delta(wall, whole=True, origin=origin, began_mono_s=1.0))
+        bench.hovers(made.standing(), 30.0)
         way = await bench.judged(action="to", place=bench.beside(30.0, 0.0), height_m=20.0)
         assert way.has_seen
         radar.fold(delta([], whole=True, origin=origin, began_mono_s=2.0))
+        bench.hovers(made.standing(), 30.0)
         again = await bench.judged(action="to", place=bench.beside(30.0, 0.0), height_m=20.0)
         assert (again.problem, again.length_m) == (way.problem, way.length_m), "the radar's node was started again"
         assert way.problem != free.problem or way.length_m > free.length_m + 5.0, "over the wall, or not at all"
@@ -207,6 +211,44 @@ def test_a_way_that_was_judged_long_ago_is_asked_for_again(
             await bench.desk.fly(ME, FlyWayBody(id=way.id))
         assert bench.vehicle.told == []
         monkeypatch.undo()
+
+    runner.run(scenario())
+
+
+def test_a_way_near_which_more_is_seen_since_it_was_judged_is_not_flown(
+    made: Made, lane: Lane, runner: asyncio.Runner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        assert bench.live.state is not None
+        origin = MapOrigin(*made.home, bench.live.state.home_alt_amsl_m or 0.0)
+        radar = bench.watch.mirrors["radar"]
+        told = {"origin": origin, "began_mono_s": 1.0}
+        old = [(-200, 0, 3), (0, -29, 1)]
+        radar.fold(delta(old, whole=True, revision=1, **told))
+        way = await bench.judged(action="to", place=bench.beside(30.0, 0.0), height_m=20.0)
+        assert way.problem is None
+        # Near it only known ground and what it was judged by; something else far away.
+        radar.fold(delta([(15, 0, 0)], explained=1, since=1, revision=2, **told))
+        radar.fold(delta([(0, -29, 1), (15, 90, 34), (300, 0, 9)], 250, since=2, revision=3, **told))
+        seen = radar.seen()
+        assert seen is not None
+        line = [made.home, made.home]
+        assert not is_more_seen_near(seen, seen, line, 1000.0)
+        assert is_more_seen_near((), seen, line, 1000.0)
+        radar.fold(delta([(16, 1, 34)], since=3, revision=4, **told))
+        with pytest.raises(CheckNeededError, match="seen more near the way") as refused:
+            await bench.desk.fly(ME, FlyWayBody(id=way.id))
+        assert refused.value.advice == "Ask for the way again."
+        radar.fold(delta([(16, 1, 34)], 20, since=4, revision=5, **told))
+        monkeypatch.setattr(way_desk, "SEEN_WITHIN_S", 0.0)
+        radar.fold(delta(old, whole=True, revision=6, parts=2, **told))
+        with pytest.raises(NotReadyError, match="Parts of the radar map"):
+            await bench.desk.fly(ME, FlyWayBody(id=way.id))
+        assert bench.vehicle.told == []
+        radar.fold(delta([], whole=True, revision=6, part=1, parts=2, **told))
+        await bench.desk.fly(ME, FlyWayBody(id=way.id))
+        assert isinstance(bench.vehicle.told[-1], FlyWay)
 
     runner.run(scenario())
 

@@ -69,6 +69,7 @@ class _Judged:
     maps: tuple[int, ...]
     """Revision of the maps, before they were looked into."""
     took_s: float
+    """By the worker, without what was waited for."""
 
 
 class HomeDesk:
@@ -102,6 +103,9 @@ class HomeDesk:
         """What was read from the vehicle while home stood where it does: it is not read again for each judgement."""
         self._asked_at: tuple[HomePlace | None, tuple[float | None, float | None]] | None = None
         """Of ``_asked``: home, and where the vehicle was."""
+        self._took_s = 0.0
+        self._lacks_maps = False
+        """The return is unknown because parts of a map are missing."""
         self._told = HomeState()
         self._moved = asyncio.Event()
 
@@ -202,7 +206,7 @@ class HomeDesk:
                 async with asyncio.timeout(LOOK_EVERY_S):
                     await self._moved.wait()
             except TimeoutError:
-                if not (self._is_due() or await self._is_seen_otherwise()):
+                if not (self._is_map_lost_or_back() or self._is_due() or await self._is_seen_otherwise()):
                     continue
             self._moved.clear()
             await self._judge_return()
@@ -239,6 +243,18 @@ class HomeDesk:
             return True
         return judged.doc.state == "unknown" or apart_m(judged.at_deg, (state.lat_deg, state.lon_deg)) > FLOWN_M
 
+    def _is_map_lost_or_back(self) -> bool:
+        """While parts of a map are missing the return is shown as unknown; it is judged once they are there."""
+        judged, is_whole = self._judged, self._ways.are_maps_whole
+        if judged is None or is_whole is not self._lacks_maps:
+            return False
+        self._lacks_maps = not is_whole
+        if self._lacks_maps:
+            doc = _unknown("Parts of a map are missing: what stands in the way is not known.", "They are waited for.")
+            self._judged = replace(judged, doc=doc)
+            self._tell()
+        return True
+
     async def _is_seen_otherwise(self) -> bool:
         """Whether sensors have seen other things since. Heavy looks are made in threads, and seldom."""
         judged, asked, maps = self._judged, self._gathered, self._ways.maps_revision
@@ -262,7 +278,7 @@ class HomeDesk:
         if state is None or home is None:
             return
         self._is_judging_return, vehicle = True, self._adopted
-        maps, began_s = self._ways.maps_revision, time.monotonic()
+        maps = self._ways.maps_revision
         self._tell()
         try:
             doc = await self._judged_return()
@@ -277,8 +293,9 @@ class HomeDesk:
             self._is_judging_return = False
         now = self._live.state
         if now is not None and now.armed and vehicle == self._adopted:
-            at_deg, took_s = (state.lat_deg or 0.0, state.lon_deg or 0.0), time.monotonic() - began_s
-            self._judged = _Judged(home, at_deg, doc, maps, took_s)
+            at_deg = (state.lat_deg or 0.0, state.lon_deg or 0.0)
+            self._judged = _Judged(home, at_deg, doc, maps, self._took_s)
+            self._lacks_maps &= doc.state == "unknown"
             self._say_if_lost(doc)
             if not is_there(here := home_of(now), home):
                 self._out_of_date(here or home, HOME_MOVED_AGAIN)
@@ -296,7 +313,9 @@ class HomeDesk:
     async def _judged_return(self) -> ReturnDoc:
         asked = self._gathered or await self._ways.asked(self._server(), ANYWHERE)
         self._gathered = asked = await self._ways.renewed(asked)
+        began_s = time.monotonic()
         doc: ReturnDoc = await self._lane.call(judge_return, asked)
+        self._took_s = time.monotonic() - began_s
         if self._gathered is asked:
             return doc
         return _unknown("What the vehicle holds was changed meanwhile.", "It is being judged anew.")

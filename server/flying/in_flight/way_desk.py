@@ -14,8 +14,10 @@ from server.errors import CheckNeededError, ConflictError, NotCertifiedError, No
 from server.flying.in_flight.way_task import WayAsked, WayJudged, judge_way
 from server.heard.channel import Channel, ShownWay
 from server.library import Library
+from server.obstacles.coming_down_task import SHADOW_M
 from server.obstacles.obstacle_watch import Watch
-from server.obstacles.surroundings import is_same_seen, maps_revision, seen_maps
+from server.obstacles.surroundings import are_maps_whole, is_more_seen_near, is_same_seen, maps_revision, seen_maps
+from server.scene.mirror import Voxels
 from server.schemas import (
     FlyWayBody,
     GuidedMessage,
@@ -42,6 +44,8 @@ from telemetry.topics.onboard_lists import PlacesOnboard
 from telemetry.topics.requests import DownloadPlaces, Operator, ReadParameters, SetSpeed
 from telemetry.topics.vehicle import VehicleState
 
+SEEN_WITHIN_S = 1.0
+"""A way that is to be flown now waits no longer for a map that is just being told."""
 TAKE_OFF_M = 1.0
 """A climb that strays no farther to the side is the take-off."""
 NOWHERE = "Nothing is judged any more, or another way was judged meanwhile."
@@ -54,6 +58,8 @@ class _InHand:
     judged_mono_s: float
     home: HomePlace | None
     """From which its heights count."""
+    maps: tuple[Voxels, ...]
+    """That it was judged by."""
     flies_since_utc_s: float | None = None
 
 
@@ -97,14 +103,16 @@ class WayDesk:
             asked = await self.asked(operator, body)
             judged: WayJudged = await self._lane.call(judge_way, asked)
             self._check_still(vehicle, flown)
-            self._in_hand = _InHand(_doc(judged, body, terrain), judged, time.monotonic(), home_of(asked.state))
+            doc, home = _doc(judged, body, terrain), home_of(asked.state)
+            self._in_hand = _InHand(doc, judged, time.monotonic(), home, asked.maps)
         finally:
             self._is_judging = False
             self._tell()
         return self.state
 
     async def fly(self, operator: Operator, body: FlyWayBody) -> None:
-        """Raises NotFoundError, NotCertifiedError, and NotAllowedError where the vehicle is elsewhere by now."""
+        """Raises NotFoundError, NotCertifiedError, CheckNeededError where home was moved or more was seen since, and
+        NotAllowedError where the vehicle is elsewhere by now."""
         in_hand = self._in_hand
         if in_hand is None or in_hand.doc.id != body.id or in_hand.doc.flies:
             raise NotFoundError(NOWHERE, advice="Ask for the way again.")
@@ -116,6 +124,7 @@ class WayDesk:
             first = doc.reasons[0] if doc.reasons else None
             what = "The way is not certified" + ("." if first is None else f": {first.text}")
             raise NotCertifiedError(what, advice="" if first is None else first.mend)
+        await self._check_seen(in_hand)
         self._check_home(in_hand)
         since_utc_s = time.time()
         speed_m_s, most_m_s = judged.speed_m_s, judged.most_m_s
@@ -198,12 +207,31 @@ class WayDesk:
         """Another one: what sensors have seen may be another."""
         return maps_revision(self._watch)
 
+    @property
+    def are_maps_whole(self) -> bool:
+        """Whether all that sensors have seen is known here."""
+        return are_maps_whole(self._watch)
+
     async def has_seen_other(self, asked: WayAsked) -> bool:
         """Whether sensors have seen other things by now than ``asked`` is judged by."""
         seen = await seen_maps(self._watch)
         return not await asyncio.to_thread(is_same_seen, asked.maps, seen)
 
     # How
+
+    async def _check_seen(self, in_hand: _InHand) -> None:
+        """Raises CheckNeededError where sensors have seen more near the way, or near the return from it, since it was
+        judged; NotReadyError where nobody knows."""
+        seen = await seen_maps(self._watch, SEEN_WITHIN_S)
+        way, home = in_hand.judged.way, in_hand.home
+        line_deg = [place[:2] for place in way.places] + ([] if home is None else [(home.lat_deg, home.lon_deg)])
+        near_m = SHADOW_M + way.certificate.required_clearance_m
+        sees_more = await asyncio.to_thread(is_more_seen_near, in_hand.maps, seen, line_deg, near_m)
+        if self._in_hand is not in_hand:
+            raise NotFoundError(NOWHERE, advice="Ask for the way again.")
+        if sees_more:
+            what = "Sensors have seen more near the way since it was judged."
+            raise CheckNeededError(what, advice="Ask for the way again.")
 
     def _check_home(self, in_hand: _InHand) -> None:
         """Raises CheckNeededError where home was moved since: the way's places would be elsewhere. A vehicle on the
