@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from mapping.geometry.arrays import F64, Bools
+from mapping.geometry.arrays import F64, I64, Bools
 from mapping.geometry.frames import LocalFrame
 from server.errors import NotReadyError
 from server.heard.channel import Channel
@@ -102,9 +102,16 @@ def is_more_seen_near(
         near = _is_near(map_.centres_enu_m[is_open][:, :2], line_m, within_m + map_.resolution_m)
         grid = map_.sensor, origin, map_.resolution_m
         known = [packed_keys(a.keys[~a.explained]) for a in before if (a.sensor, a.origin, a.resolution_m) == grid]
-        if not np.isin(packed_keys(map_.keys[is_open][near]), np.concatenate([np.zeros(0, np.int64), *known])).all():
+        if not _are_among(packed_keys(map_.keys[is_open][near]), np.concatenate([np.zeros(0, np.int64), *known])):
             return True
     return False
+
+
+def _are_among(numbers: I64, known: I64) -> bool:
+    """Whether all are. Of millions, sorting is faster than ``np.isin``."""
+    known = np.sort(known)
+    at = np.searchsorted(known, numbers)
+    return bool((at < len(known)).all() and (known[at] == numbers).all())
 
 
 def _is_near(points_m: F64, line_m: F64, within_m: float) -> Bools:

@@ -36,7 +36,8 @@ class Kept:
         if not len(ids):
             return
         before = self.grids.get(grid, np.zeros(0, np.int64))
-        kept = np.union1d(before, ids)
+        both = np.sort(np.concatenate([before, ids]))  # of millions, faster than np.union1d
+        kept = both[np.diff(both, prepend=both[0] - 1) > 0]
         if self.voxel_count - len(before) + len(kept) > MOST_VOXELS:
             self.is_over_full = True
         else:
