@@ -24,6 +24,12 @@ def reviewed(station: Station, page: Page, shared_data: Path) -> Page:
     page.get_by_test_id("tab-review").click()
     choose(page, page.get_by_test_id("recording-import"), _tlog(shared_data))
     expect(page.get_by_test_id("replay-badge")).to_be_visible()
+
+    def takes_orders() -> bool:
+        """It is judged and shown before its file is open to be played."""
+        return station.http.post("/api/review/play", json={"playing": False}).is_success
+
+    wait_until(page, takes_orders)
     return page
 
 

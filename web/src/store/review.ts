@@ -112,10 +112,11 @@ class LatestOnly {
       return;
     }
     this.isBusy = true;
-    await order({ place: PLAYING, path: "/api/review/play", body });
+    const answer = await order({ place: PLAYING, path: "/api/review/play", body });
     this.isBusy = false;
     const next = this.waiting;
     this.waiting = null;
+    if (body.at_s !== undefined && next?.at_s === undefined) settle(answer !== null);
     if (next) await this.send(next);
   }
 }
@@ -139,18 +140,25 @@ export function togglePlaying(): void {
 
 export const setSpeed = (speed: number) => ask({ playing: isPlaying.value, speed });
 
-/** A jump that the replay never confirms is forgotten. */
+/** A jump that was taken but that the replay never confirms is forgotten. */
 const SETTLE_MS = 3000;
 let settling: ReturnType<typeof setTimeout> | undefined;
+
+/** The last place that was asked for is answered: a refused jump is forgotten at once. */
+function settle(isTaken: boolean): void {
+  clearTimeout(settling);
+  if (!seeking.value?.isOver) return;
+  if (isTaken) settling = setTimeout(() => (seeking.value = null), SETTLE_MS);
+  else seeking.value = null;
+}
 
 /** Goes to a time; while dragging (`isOver` false) the page stays with the pointer. */
 export function seek(at_s: number, isOver = true): void {
   if (!review.value || isObserver.value) return;
   const kept_s = Math.min(length_s(), Math.max(0, at_s));
+  clearTimeout(settling);
   seeking.value = { at_s: kept_s, isOver };
   ask({ playing: isPlaying.value, at_s: kept_s });
-  clearTimeout(settling);
-  if (isOver) settling = setTimeout(() => (seeking.value = null), SETTLE_MS);
 }
 
 export function seekBy(by_s: number): void {
