@@ -107,6 +107,8 @@ def sighted(tmp_path_factory: pytest.TempPathFactory, console: None) -> Iterator
 def vehicle(station: Station) -> Iterator[SimulatedVehicle]:
     with simulated_vehicle() as flying:
         yield flying
+        # Else what it flew goes on being written for a while, and is listed in the middle of a later test.
+        station.http.post("/api/recorder/stop")
         # Before it is gone: the next test's station has never heard of it.
         station.http.post("/api/link/disconnect", json={"address": flying.address})
 

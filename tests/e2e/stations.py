@@ -98,12 +98,16 @@ class Station:
                 ok(self.http.delete(f"/api/terrains/{terrain['id']}"))
 
     def _delete_recordings(self) -> None:
-        """One that is still being written can be deleted once it has ended."""
+        """One that is still being written is listed, and can be deleted, once it has ended."""
         end_s = time.monotonic() + PATIENCE_S
-        while left := ok(self.http.get("/api/recordings")).json():
-            for recording in left:
+        while True:
+            listed = ok(self.http.get("/api/recordings")).json()
+            for recording in listed:
                 self.http.delete(f"/api/recordings/{recording['id']}")
-            assert time.monotonic() < end_s, f"recordings that cannot be deleted: {left}"
+            files = sorted((self.data_dir / "recordings").glob("*.mcap"))
+            if not listed and not files:
+                return
+            assert time.monotonic() < end_s, f"recordings that cannot be deleted: {listed or files}"
 
     def open_demo(self, points: Callable[[dict[str, Point]], list[Point]], profile: dict[str, float]) -> None:
         """The demo's plan alone, with other points, made of its own by name, and another profile."""
