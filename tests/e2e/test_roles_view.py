@@ -49,6 +49,8 @@ def test_control_is_taken_by_a_press_asked_for_and_free_once_nobody_is_heard(
     other_page.goto(invited(station, "Ada", "operator"))
     other_page.get_by_test_id("tab-fly").click()
     expect(other_page.get_by_test_id("chip-operator")).to_contain_text("Looking on")
+    ask = other_page.get_by_test_id("take-control")
+    expect(ask).to_contain_text("Ask for control")
     hold(other_page, "take-control")
     asked = page.get_by_test_id("asked")
     expect(asked).to_contain_text("Ada asks for control of the vehicle")
@@ -56,6 +58,7 @@ def test_control_is_taken_by_a_press_asked_for_and_free_once_nobody_is_heard(
     expect(asked).to_have_count(0)
     expect(other_page.get_by_test_id("toast")).to_contain_text("keeps control")
 
+    expect(ask).to_contain_text("Ask for control")
     hold(other_page, "take-control")
     page.get_by_test_id("hand-over").click()
     expect(other_page.get_by_test_id("chip-operator")).to_contain_text("In charge")

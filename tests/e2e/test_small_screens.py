@@ -206,8 +206,8 @@ def test_while_something_has_failed_the_bars_stay_readable_at_every_width(
     page.get_by_test_id("tab-fly").click()
     expect(page.get_by_test_id("chip-link")).to_contain_text("Link failed")
     if is_server_lost:
-        sides.pop().close(code=4408)
         page.context.route_web_socket(STREAM, lambda side: side.close(code=4408))
+        sides.pop().close(code=4408)
         expect(page.get_by_test_id("link-state")).to_contain_text("No connection")
     found = {}
     for width in (1440, 1180, 1024, 820, 390):

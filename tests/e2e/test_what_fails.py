@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Literal
 
 import pytest
-from playwright.sync_api import BrowserContext, Page, WebSocketRoute, expect
+from playwright.sync_api import BrowserContext, Page, Request, WebSocketRoute, expect
 
 from server.schemas import NodeDoc, NodesMessage
 from tests.e2e.conftest import simulated_vehicle
@@ -141,6 +141,10 @@ def test_after_its_line_was_cut_a_page_and_its_3d_view_come_back(page_3d: Page, 
     station = Station(tmp_path / "data", environment={**os.environ, "HEDGEHOP_ALLOWED_HOSTS": line.host})
     try:
         line.lead_to(int(station.origin.rpartition(":")[2]))
+        begun, ended = list[Request](), list[Request]()
+        page_3d.on("request", lambda request: begun.append(request))
+        page_3d.on("requestfinished", lambda request: ended.append(request))
+        page_3d.on("requestfailed", lambda request: ended.append(request))
         enter(page_3d, station, f"http://{line.host}")
         page_3d.get_by_test_id("tab-plan").click()  # the console has the focus
 
@@ -149,6 +153,14 @@ def test_after_its_line_was_cut_a_page_and_its_3d_view_come_back(page_3d: Page, 
 
         wait_until(page_3d, lambda: bool(views()))
         src = page_3d.get_by_test_id("view-frame").get_attribute("src")
+
+        def has_all() -> bool:
+            """The browser's console tells a request that was cut off as an error."""
+            told = len(begun)
+            page_3d.wait_for_timeout(1000)
+            return told == len(begun) == len(ended)
+
+        wait_until(page_3d, has_all)
         before = len(views())
         line.cut()
         expect(page_3d.get_by_test_id("link-state")).to_have_class(re.compile(r"\bopen\b"))
