@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.stations import SimulatedVehicle, Station
-from tests.e2e.steps import check, connect, hold, open_demo, open_recording, return_home, upload
+from tests.e2e.steps import check, connect, open_demo, open_recording, return_home, start, upload
 from tests.server.station import ok
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
@@ -86,9 +86,7 @@ def test_the_list_is_written_ticked_demanded_and_reviewed(
     for number in (1, 2, 3, 4):
         page.get_by_test_id(f"tick-{number}").check()
     expect(page.get_by_test_id("checklist-left")).to_have_text("all ticked")
-    check(page)
-    hold(page, "next-start")
-    expect(page.get_by_test_id("next-action")).to_have_attribute("data-step", "pause")
+    start(page)
     return_home(page)
     open_recording(page)
     ticked = page.get_by_test_id("review-checklist")

@@ -11,7 +11,7 @@ from playwright.sync_api import Page, WebSocketRoute, expect
 from server.schemas import FleetMessage
 from server.schemas.station_docs import VehicleAlarm, VehicleDoc
 from tests.e2e.stations import Station
-from tests.e2e.steps import LONG_MS, STREAM, enter, visit
+from tests.e2e.steps import LONG_MS, STREAM, enter, hold, press_after_g, visit
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
@@ -22,13 +22,6 @@ def pair(tmp_path_factory: pytest.TempPathFactory, console: None) -> Iterator[St
     station = Station(tmp_path_factory.mktemp("data") / "data", "--demo", "--demo-vehicles", "2")
     yield station
     station.stop()
-
-
-def hold(page: Page, testid: str) -> None:
-    page.get_by_test_id(testid).hover()
-    page.mouse.down()
-    expect(page.get_by_test_id("chip-operator")).to_contain_text("In charge")
-    page.mouse.up()
 
 
 def test_one_press_shows_another_vehicle_and_moves_nobody_s_charge(pair: Station, page: Page) -> None:
@@ -43,9 +36,9 @@ def test_one_press_shows_another_vehicle_and_moves_nobody_s_charge(pair: Station
     expect(operator).to_contain_text("Nobody in charge")
     expect(page.get_by_test_id("chip-mode")).to_contain_text("disarmed")
     hold(page, "take-control")
-    page.keyboard.press("g")
-    page.keyboard.press("1")
-    expect(page.get_by_test_id("vehicle-1")).to_have_attribute("aria-pressed", "true")
+    expect(operator).to_contain_text("In charge")
+    first = page.get_by_test_id("vehicle-1")
+    press_after_g(page, "1", lambda ms: expect(first).to_have_attribute("aria-pressed", "true", timeout=ms))
     expect(operator).to_contain_text("In charge")
     # A page that is loaded anew begins with the first one.
     page.reload()

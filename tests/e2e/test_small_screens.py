@@ -36,7 +36,7 @@ from server.schemas.strict_model import Message
 from telemetry.topics.messages import Candidate, LinkStatus, RecorderStatus, VehicleText
 from telemetry.topics.vehicle import VehicleState
 from tests.e2e.stations import Station
-from tests.e2e.steps import STREAM, visit
+from tests.e2e.steps import STREAM, hold_return, visit
 from tests.server.obstacle_messages import alert, approach, obstacle, status
 from tests.server.station import ok
 
@@ -147,10 +147,7 @@ def test_what_is_asked_of_home_is_seen_to_its_end_and_what_return_says_covers_no
     expect(page.get_by_test_id("home-set")).to_be_in_viewport(ratio=1)
     expect(page.get_by_test_id("home-drop")).to_be_in_viewport(ratio=1)
 
-    page.get_by_test_id("return-home").focus()
-    page.keyboard.down("Enter")
-    expect(page.get_by_test_id("outcome-safety")).to_contain_text("returns home")
-    page.keyboard.up("Enter")
+    hold_return(page)
     said, fleet = page.evaluate(BOXES, ["outcome-safety", "fleet"])
     assert not _overlap(said, fleet)
 
