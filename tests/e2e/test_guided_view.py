@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.stations import SimulatedVehicle, Station
-from tests.e2e.steps import LONG_MS, connect, disarmed, drawn, hold, open_demo
+from tests.e2e.steps import LONG_MS, click_surface, connect, disarmed, drawn, hold, open_demo
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
@@ -45,15 +45,13 @@ def test_one_way_after_the_other_is_judged_shown_and_flown(
     flown(page)
 
     # So slowly that it is still under way when a slow page has made it faster.
-    page.get_by_test_id("way-speed").fill("1")
+    page.get_by_test_id("way-speed").fill("0.5")
     page.get_by_test_id("way-speed").press("Enter")
     page.get_by_test_id("view-top").click()
     page.get_by_test_id("way-click").click()
     expect(page.get_by_test_id("tool-hint")).to_contain_text("the way leads there")
-    view = page.get_by_test_id("view-frame").bounding_box()
-    assert view is not None
-    page.mouse.click(view["x"] + view["width"] / 2, view["y"] + view["height"] / 2)
-    expect(page.get_by_test_id("tool-hint")).to_have_count(0)
+    hint = page.get_by_test_id("tool-hint")
+    click_surface(page, (0.5, 0.5), lambda ms: expect(hint).to_have_count(0, timeout=ms))
     expect(card).to_have_attribute("data-problem", "none")
     expect(page.get_by_test_id("undo")).to_be_disabled()
     hold(page, "way-fly")

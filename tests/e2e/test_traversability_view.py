@@ -17,7 +17,7 @@ from playwright.sync_api import Page, expect
 
 from server.door.sensor_token import sensor_token
 from tests.e2e.stations import Station
-from tests.e2e.steps import choose, drawn, open_demo
+from tests.e2e.steps import choose, click_surface, drawn, open_demo
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
@@ -66,10 +66,8 @@ def test_landing_sites_are_looked_for_where_the_surface_was_clicked(station: Sta
     page.get_by_test_id("view-top").click()
     page.get_by_test_id("sites-click").click()
     expect(page.get_by_test_id("tool-hint")).to_contain_text("land")
-    view = page.get_by_test_id("view-frame").bounding_box()
-    assert view is not None
-    page.mouse.click(view["x"] + view["width"] / 2, view["y"] + view["height"] / 2)
-    expect(page.get_by_test_id("sites-near")).to_be_visible()
+    near = page.get_by_test_id("sites-near")
+    click_surface(page, (0.5, 0.5), lambda ms: expect(near).to_be_visible(timeout=ms))
     # The tool has been put down, and the plan is as it was.
     expect(page.get_by_test_id("tool-hint")).to_have_count(0)
     expect(page.get_by_test_id("undo")).to_be_disabled()
