@@ -80,8 +80,8 @@ class MapMirror:
     _flies: bool = False
     _is_of_before: bool = False
     """What is in the map was seen in a flight before."""
-    _clear_count: int = 0
-    """Of the order by which all maps were emptied last: what was told before it is void."""
+    _clear_count: int | None = None
+    """Of the order by which all maps were emptied last: what was told before it is void. None: none was given."""
     _parts_in: int = 0
     _parts: int = 0
     _lacks: bool = False
@@ -139,7 +139,7 @@ class MapMirror:
             raise ValueError(f"{len(keys)} keys, {len(probability)} probabilities, {len(explained)} verdicts")
         sound = (np.abs(keys) < _OFFSET).all(axis=1)
         with self._lock:
-            if delta.clear_count < self._clear_count:
+            if self._clear_count not in (None, delta.clear_count):
                 return True
             follows, is_first = self._follows(delta), delta.whole and delta.part == 0
             self._begin(delta, is_first=is_first)

@@ -69,7 +69,7 @@ class MapDelta:
     """Since when there is this map. Another one: it is another map, and what the one before held is not in it because
     nobody has looked again yet. The same one may be laid anew from its frames."""
     clear_count: int = 0
-    """``PerceptionSettings.clear_count`` that its node knew of: whoever has given a later order passes this over."""
+    """``PerceptionSettings.clear_count`` that its node knew of: who has ordered otherwise since passes this over."""
 
 
 def pack_keys(keys: NDArray[np.integer]) -> bytes:

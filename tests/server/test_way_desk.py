@@ -253,6 +253,25 @@ def test_a_way_near_which_more_is_seen_since_it_was_judged_is_not_flown(
     runner.run(scenario())
 
 
+def test_who_walks_about_beside_a_take_off_is_no_matter_unless_he_is_near_it(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane, up_m=0.0)
+        assert bench.live.state is not None
+        origin, radar = MapOrigin(*made.home, bench.live.state.home_alt_amsl_m or 0.0), bench.watch.mirrors["radar"]
+        way = await bench.judged(action="take_off", height_m=10.0)
+        assert way.problem is None, way.reasons
+        radar.fold(delta([(1, 1, 0)], whole=True, origin=origin))
+        with pytest.raises(CheckNeededError, match="seen more near the way"):
+            await bench.desk.fly(ME, FlyWayBody(id=way.id))
+        radar.fold(delta([(12, 8, 0), (12, 8, 1)], whole=True, revision=2, origin=origin))
+        await bench.desk.fly(ME, FlyWayBody(id=way.id))
+        assert bench.vehicle.told
+
+    runner.run(scenario())
+
+
 def test_a_way_that_was_judged_before_home_moved_is_not_flown(made: Made, lane: Lane, runner: asyncio.Runner) -> None:
     async def scenario() -> None:
         bench = Bench(made, lane)

@@ -225,7 +225,9 @@ class WayDesk:
         seen = await seen_maps(self._watch, SEEN_WITHIN_S)
         way, home = in_hand.judged.way, in_hand.home
         line_deg = [place[:2] for place in way.places] + ([] if home is None else [(home.lat_deg, home.lon_deg)])
-        near_m = SHADOW_M + way.certificate.required_clearance_m
+        # Of a take-off who walks about farther away is no matter: nothing is flown along yet that could be behind him.
+        shadow_m = SHADOW_M if is_in_the_air(self._vehicle()) else 0.0
+        near_m = shadow_m + way.certificate.required_clearance_m
         sees_more = await asyncio.to_thread(is_more_seen_near, in_hand.maps, seen, line_deg, near_m)
         if self._in_hand is not in_hand:
             raise NotFoundError(NOWHERE, advice="Ask for the way again.")
