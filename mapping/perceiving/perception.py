@@ -63,6 +63,8 @@ class Perception:
         self._flying = True
         self._has_fix = True
         self._newest: tuple[float, int, str] | None = None
+        self._came_mono_s = -math.inf
+        """When that came, which may be a good while after it was measured."""
         self._sweep: tuple[float, tuple[float | None, ...]] = (-math.inf, ())
         self._sector = self._sector_points(settings)
         self._remembered = Remembered(settings.resolution_m)
@@ -172,7 +174,7 @@ class Perception:
             missing = frame.number - number - 1
             if source == frame.source and 0 < missing < LARGEST_GAP:
                 self.lost_frames += missing
-        self._newest = (t, frame.number, frame.source)
+        self._newest, self._came_mono_s = (t, frame.number, frame.source), now_mono_s
         return None
 
     def _pose_for(self, frame: SensorFrame, now_mono_s: float) -> Pose | FrameResult:
@@ -204,7 +206,7 @@ class Perception:
     def _state(self, now_mono_s: float) -> tuple[State, str]:
         if self._newest is None:
             return "waiting", f"No {self.name} frame has come yet."
-        silent_s = now_mono_s - self._newest[0]
+        silent_s = now_mono_s - self._came_mono_s
         if silent_s > SILENT_S:
             return "stale", f"No {self.name} frame for {silent_s:.0f} s. Check the sensor."
         return self._pose_state(now_mono_s)

@@ -315,7 +315,7 @@ AvoidBy = Literal["climb", "sidestep"]
 
 @dataclass(frozen=True, slots=True)
 class Eye:
-    """A sensor whose word counts at present."""
+    """A sensor that works."""
 
     sensor: Sensor
     since_t_mono_s: float
@@ -324,6 +324,8 @@ class Eye:
     """So far ahead it is relied on."""
     largest_speed_m_s: float
     """From which that is enough to stop in."""
+    is_late: bool = False
+    """What it sees in the way counts; that nothing is in the way does not."""
 
 
 @dataclass(frozen=True, slots=True)

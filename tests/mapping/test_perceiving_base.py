@@ -78,6 +78,16 @@ def test_states() -> None:
     assert "3 s" in late.text
 
 
+def test_a_frame_that_comes_late_is_told_with_its_region_and_is_no_silence() -> None:
+    radar = flown()
+    result = radar.on_frame(scan(100.5, 1), 102.0)
+    assert (result.accepted, result.state, result.text) == (True, "running", "")
+    assert result.region is not None
+    assert radar.on_tick(102.5).state == "running"
+    silent = radar.on_tick(103.1)
+    assert (silent.state, silent.text) == ("stale", "No radar frame for 1 s. Check the sensor.")
+
+
 @pytest.mark.parametrize(("stops", "other"), [("position", "attitude"), ("attitude", "position")])
 def test_what_the_vehicle_does_not_tell_any_more_is_said(stops: str, other: str) -> None:
     radar = RadarPerception(Settings())

@@ -202,11 +202,39 @@ def test_frames_that_come_late_make_it_slower_and_stop_it_before_what_they_saw(
     it.advance(10.0)
     assert state(it) == "holding", "what is seen late is not seen to be clear"
     assert max(n for _, n, u in it.trail if u < 15.5) < 40.0 - 1.0
-    late = f"{sensor.capitalize()}: over 0.5 s late. It brakes that much later; end what else runs here."
+    late = (
+        f"{sensor.capitalize()}: over 0.5 s late. It brakes that much later, and then holds; end what else runs here."
+    )
     assert late in it.texts
-    assert it.avoiding.status.text.startswith(f"Frames from {sensor} come over 0.5 s late. It climbs on by itself")
-    it.senses[0].late_s = 0.05
+    if it.avoiding.slowed_to_m_s is not None:
+        assert any(text.startswith("Slowed to ") and text.endswith(f", and came late. {late}") for text in it.texts)
+    waits = f"Frames from {sensor} come over 0.5 s late. It climbs on by itself once they come in time. Or return home."
+    assert it.avoiding.status.text == waits
+    it.senses[0].silent = True
+    it.until(lambda: it.avoiding.status.text.startswith(f"Nothing new from {sensor}. "), 3)
+    it.senses[0].silent, it.senses[0].late_s = False, 0.05
     it.until(lambda: state(it) == "offset", 60)
+    assert max(n for _, n, u in it.trail if u < 15.5) < 40.0 - 0.6
+
+
+@pytest.mark.parametrize("late_s", [0.3, 0.4, 0.48])
+@pytest.mark.parametrize(("sensor", "depth_m", "period_s"), [("radar", 10.0, 0.1), ("vision", 7.0, 0.2)])
+def test_a_sensor_that_is_a_little_late_does_not_make_it_stop_and_go(
+    sensor: Any, depth_m: float, period_s: float, late_s: float
+) -> None:
+    it = craft(Wall(40, 15), senses=[Sense(sensor, depth_m, period_s, late_s=late_s)])
+    it.until(lambda: state(it) == "offset", 90)
+    assert max(n for _, n, u in it.trail if u < 15.5) < 40.0 - 0.6
+    it.advance(10.0)
+    assert len(it.modes()) <= 3
+    assert "holding" not in it.states
+
+
+def test_a_late_sensor_beside_one_in_time_does_not_keep_it_from_climbing_on() -> None:
+    late = Sense("vision", 7.0, 0.2, late_s=0.8)
+    it = craft(Wall(40, 15), senses=[Sense("radar", 10.0, 0.1), late])
+    it.until(lambda: state(it) == "offset", 90)
+    assert "holding" not in it.states
     assert max(n for _, n, u in it.trail if u < 15.5) < 40.0 - 0.6
 
 

@@ -89,3 +89,9 @@ def test_speeds_are_the_largest_of_the_mission_and_what_is_not_known_is_not_told
     assert flown_speeds({}, onboard(2.0), "ardupilot").mission_m_s == 2.0
     assert flown_speeds({**REAL, "RTL_SPEED": 300.0}, None, "ardupilot") == Speeds(None, 3.0, "RTL_SPEED", 5.0)
     assert flown_speeds(REAL, onboard(3.0), "px4") == Speeds()
+
+
+def test_a_sensor_that_is_late_is_to_be_accepted() -> None:
+    late = row(replace(ON, eyes=(replace(RADAR, is_late=True),)))
+    assert late.state == "accept"
+    assert "Frames from radar come over 0.5 s late: it brakes later, and then holds." in late.text

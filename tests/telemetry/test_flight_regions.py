@@ -121,23 +121,45 @@ def test_how_fast_it_may_be_follows_from_what_each_sensor_sees_and_how_late() ->
     assert late[1] < speed_m_s - 0.2
 
 
-def test_a_late_frame_shows_what_is_in_the_way_for_two_seconds_and_nothing_to_be_clear() -> None:
+def test_a_late_frame_shows_what_is_in_the_way_and_nothing_to_be_clear() -> None:
     regions, vision = Regions(PerceptionSettings()), frozenset[Sensor]({"vision"})
     regions.take(status(1.0, obstacles=(seen_at(5.0),)), 1.9)
     assert regions.counted(1.9) == ()
-    assert regions.seen_by(1.9) == vision
-    assert [eye.late_s(1.9) for eye in regions.eyes(1.9)] == [pytest.approx(0.9)]
+    assert regions.seen_by(1.9) == regions.seen_by(2.8) == vision
+    assert regions.silent(vision, 1.9) is not None
     in_time, late = of(status(1.0)).slowest(1.0), regions.slowest(1.9)
     assert in_time is not None
     assert late is not None
     assert late[1] < in_time[1] - 0.5
-    assert regions.seen_by(3.1) == frozenset()
+    assert regions.seen_by(3.0) == frozenset(), "nothing has come for a second"
     for k in range(1, 10):
         regions.take(status(1.0 + 0.1 * k), 1.9 + 0.1 * k)
     assert regions.seen_by(2.8) == frozenset(), "a newer frame does not show it"
     assert not regions.is_clear(vision, 2.8)
-    assert regions.slowest(3.9) is None
-    assert regions.eyes(3.9) == []
+    assert (regions.slowest(3.9), regions.eyes(3.9)) == (None, [])
+    regions.take(status(4.0, obstacles=(seen_at(5.0),)), 6.1)
+    assert regions.eyes(6.1) == [], "nobody knows what stands there now"
+
+
+def test_one_late_frame_is_a_hiccup_and_two_count_for_a_while() -> None:
+    def slowest(*came_after_s: float) -> tuple[bool, float]:
+        regions = Regions(PerceptionSettings())
+        for k, late_s in enumerate(came_after_s):
+            regions.take(status(1.0 + 0.2 * k, latency_s=0.1), 1.0 + 0.2 * k + late_s)
+        now_s = 1.0 + 0.2 * (len(came_after_s) - 1) + came_after_s[-1]
+        (sight,) = regions.eyes(now_s)
+        found = regions.slowest(now_s)
+        assert found is not None
+        return sight.is_late, found[1]
+
+    usual, once = slowest(*[0.1] * 20), slowest(*[0.1] * 18, 0.9, 0.1)
+    assert once == usual
+    assert slowest(*[0.1] * 19, 0.9)[0], "that one shows nothing to be clear"
+    twice = slowest(*[0.1] * 17, 0.9, 0.9, 0.1)
+    assert twice[0]
+    assert twice[1] < usual[1] - 0.5
+    assert slowest(*[0.1] * 5, 0.9, 0.9, *[0.1] * 19) == usual
+    assert slowest(*[0.45] * 20)[1] < usual[1] - 0.2, "slower than its node alone knows"
 
 
 def test_what_is_told_of_a_refused_frame_says_nothing_about_the_region() -> None:

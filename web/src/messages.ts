@@ -323,12 +323,13 @@ export interface ErrorInfo {
   advice: string;
 }
 
-/** A sensor whose word counts at present. */
+/** A sensor that works. */
 export interface Eye {
   sensor: "radar" | "vision" | "ranges";
   since_t_mono_s: number;
   depth_m: number;
   largest_speed_m_s: number;
+  is_late: boolean;
 }
 
 /** The camera's map of the whole flight. */

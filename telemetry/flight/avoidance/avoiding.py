@@ -94,6 +94,7 @@ class Avoiding:
             cannot=self._cannot,
             speed_m_s=(self._state and self._state.ground_speed_m_s) or 0.0,
             slowed_to_m_s=self.slowed_to_m_s,
+            slowed_as_late=self._slowing.as_late,
         )
         return status_of(now, self.regions, self.detour)
 
@@ -334,7 +335,8 @@ class Avoiding:
         largest_m_s = self.largest_speed_m_s(now_s)
         if largest_m_s is None or not _is_flying(state) or state.mode not in self._helm.orders.flown_from:
             return []
-        return self._slowing.look(state, largest_m_s, now_s)
+        is_late = any(sight.is_late for sight in self.regions.eyes(now_s))
+        return self._slowing.look(state, largest_m_s, now_s, is_late=is_late)
 
     def _most_m_s(self, now_s: float) -> float:
         """Of what is ordered here. Who flies without avoidance flies as fast as planned."""
@@ -363,15 +365,17 @@ class Slowing:
     def __init__(self, helm: Helm) -> None:
         self._helm = helm
         self.asked_m_s: float | None = None
+        self.as_late = False
+        """It was slowed while frames came late."""
         self._asked_s = -math.inf
         self._mode = ""
 
     def on_state(self, state: VehicleState) -> None:
         """Another mode has speeds of its own."""
         if state.mode != self._mode:
-            self._mode, self.asked_m_s, self._asked_s = state.mode, None, -math.inf
+            self._mode, self.asked_m_s, self._asked_s, self.as_late = state.mode, None, -math.inf, False
 
-    def look(self, state: VehicleState, largest_m_s: float, now_s: float) -> list[Action]:
+    def look(self, state: VehicleState, largest_m_s: float, now_s: float, *, is_late: bool) -> list[Action]:
         """In a mode that is flown by no pilot."""
         speed_m_s = state.ground_speed_m_s or 0.0
         wanted_m_s = largest_speed(largest_m_s)
@@ -379,7 +383,7 @@ class Slowing:
             return []
         actions = self._helm.slow_down(wanted_m_s, now_s)
         if actions:
-            self.asked_m_s, self._asked_s = wanted_m_s, now_s
+            self.asked_m_s, self._asked_s, self.as_late = wanted_m_s, now_s, is_late
         return actions
 
 

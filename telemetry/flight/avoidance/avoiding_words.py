@@ -22,6 +22,7 @@ class Now:
     """Something is in the way of a flight that it could not go on with."""
     speed_m_s: float
     slowed_to_m_s: float | None
+    slowed_as_late: bool = False
 
 
 def status_of(now: Now, regions: Regions, detour: Detour) -> AvoidanceStatus:
@@ -45,6 +46,7 @@ def _eyes(regions: Regions, now_s: float) -> tuple[Eye, ...]:
             round(sight.since_s, 1),
             sight.depth_m,
             round(regions.stopping(sight).largest_speed_m_s(sight.depth_m), 1),
+            is_late=sight.is_late,
         )
         for sight in regions.eyes(now_s)
     )
@@ -80,7 +82,7 @@ def _text(now: Now, regions: Regions, detour: Detour) -> str:
         if regions.eyes(now.t_s):
             return _fence_words(detour)
         return "No sensor sees ahead: nothing brakes by itself."
-    return _speed_words(now, *slowest) or _late_words(now, regions) or _fence_words(detour)
+    return " ".join(filter(None, (_speed_words(now, *slowest), _late_words(now, regions)))) or _fence_words(detour)
 
 
 def _fence_words(detour: Detour) -> str:
@@ -94,18 +96,14 @@ def _speed_words(now: Now, sight: Sight, largest_m_s: float) -> str:
     if now.speed_m_s > largest_m_s + FASTER_M_S:
         return f"Too fast to stop, {sees}: {now.speed_m_s:.1f} m/s, at most {largest_m_s:.1f} m/s."
     if now.slowed_to_m_s is not None:
-        return f"Slowed to {now.slowed_to_m_s:.1f} m/s: {sees}."
+        return f"Slowed to {now.slowed_to_m_s:.1f} m/s: {sees}{', and came late' if now.slowed_as_late else ''}."
     return ""
 
 
 def _late_words(now: Now, regions: Regions) -> str:
-    late = [SENSOR_WORDS[sight.sensor] for sight in regions.eyes(now.t_s) if sight.late_s(now.t_s)]
-    who = " and ".join(late)
-    return (
-        f"{who.capitalize()}: over {OLD_S:g} s late. It brakes that much later; end what else runs here."
-        if late
-        else ""
-    )
+    who = " and ".join(SENSOR_WORDS[sight.sensor] for sight in regions.eyes(now.t_s) if sight.is_late)
+    does = "It brakes that much later, and then holds; end what else runs here."
+    return f"{who.capitalize()}: over {OLD_S:g} s late. {does}" if who else ""
 
 
 def _engaged_text(regions: Regions, detour: Detour, now_s: float) -> str:

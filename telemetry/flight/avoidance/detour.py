@@ -66,7 +66,8 @@ class Detour(DetourState):
     ) -> list[Action]:
         """A prepared way, then the rest ``offset_m`` higher than planned."""
         kind, from_m = Over if over else Past, places[0].alt_rel_home_m
-        lookouts = self._regions.seen_by(now_s) or frozenset(self._regions.counted(now_s))
+        seen_by, eyes = self._regions.seen_by(now_s), self._regions.eyes(now_s)
+        lookouts = seen_by or frozenset(self._regions.counted(now_s)) or frozenset(eye.sensor for eye in eyes)
         self._set_out(kind(places, max(offset_m, self.offset_m), lookouts, from_m, from_m), remaining, frozenset())
         self._plan_m = None
         return self._brake("way ordered", now_s, then="climb")
@@ -151,6 +152,7 @@ class Detour(DetourState):
 
     def look(self, state: VehicleState, now_s: float) -> list[Action]:
         """The first event of this phase that holds now is done."""
+        self._renew_why(state, now_s)
         before = _ALWAYS[self.phase](self, state, now_s) if self.phase in _ALWAYS else []
         for event in TABLE[self.phase]:
             holds, follow = _LOOKS.get(event, (_never, _nothing))
@@ -158,6 +160,12 @@ class Detour(DetourState):
                 self._enter(event)
                 return [*before, *follow(self, state, now_s)]
         return before
+
+    def _renew_why(self, state: VehicleState, now_s: float) -> None:
+        """Why it holds may change while it does."""
+        if self.phase == "holding" and not self._paused:
+            missing = self._trusted.blind if self._then == "climb" else self._trusted.silent
+            self.why = missing(state, now_s) or self.why
 
     def _enter(self, event: Event) -> bool:
         phase = next_phase(self.phase, event)

@@ -13,9 +13,9 @@ from telemetry.topics.obstacles import PerceptionSettings, PerceptionStatus, Sen
 
 SENSOR_WORDS: dict[Sensor, str] = {"radar": "radar", "vision": "vision", "ranges": "range sensors"}
 OLD_S = 0.5
-"""What a frame or pose older than this shows to be clear need not be so now."""
+"""What a frame that comes later than this shows to be clear need not be so now; nor where none has come for so long."""
 LATE_S = 2.0
-"""What a frame saw in the way stands there until a newer one of that sensor comes, or it is older than this."""
+"""What a frame that comes no later than this saw in the way stands there, until a newer one of that sensor comes."""
 BLIND_S = 1.0
 """Without a frame for so long a sensor is no eye any more."""
 CLEAR_FRAMES = 3
@@ -30,6 +30,8 @@ SLOWEST_M_S = 0.3
 """No vehicle is told to fly slower than this: its sensors see nothing that it could stop for."""
 USUAL_PERIOD_S: dict[Sensor, float] = {"radar": 0.1, "vision": 0.2, "ranges": 0.1}
 """Between frames."""
+JUDGED_FRAMES = 20
+"""By the second latest of so many it is judged how late a sensor is: one alone may be a hiccup of ours."""
 PERIOD_FADES = 0.95
 """A longer time between two frames counts on, less and less: what came late once may again."""
 
@@ -41,10 +43,12 @@ class Sight:
     sensor: Sensor
     t_mono_s: float
     came_mono_s: float
+    ages_s: tuple[float, ...]
+    """Of its newest frames, as they came."""
     counts: bool
     """It works: it is neither blind nor frozen nor waiting for its first frame."""
-    flowed_t_mono_s: float
-    """Of its newest frame that was placed, whether it showed anything or not."""
+    flowed_mono_s: float
+    """When its newest frame came that was placed, whether it showed anything or not."""
     occupied: bool
     distance_m: float | None
     """Of what is nearest in its way."""
@@ -67,17 +71,22 @@ class Sight:
     forgot: bool = False
     """Its map began anew since it was last relied on: what stood in the way is not in it any more."""
 
+    @property
+    def late_s(self) -> float:
+        """How late its frames come."""
+        return sorted(self.ages_s)[-2:][0] if self.ages_s else 0.0
+
+    @property
+    def is_late(self) -> bool:
+        """Too late to show that nothing is in the way."""
+        return max(self.late_s, self.came_mono_s - self.t_mono_s) > OLD_S
+
     def is_fresh(self, now_s: float) -> bool:
-        return self.counts and now_s - self.t_mono_s <= OLD_S
+        return self.counts and not self.is_late and now_s - self.came_mono_s <= OLD_S
 
     def is_eye(self, now_s: float) -> bool:
         """It works, and shows in time to be stopped for what is in the way, if not that nothing is."""
-        return self.counts and now_s - self.came_mono_s <= BLIND_S and now_s - self.t_mono_s <= LATE_S
-
-    def late_s(self, now_s: float) -> float:
-        """How late its frames come while they are too late to show that nothing is in the way; otherwise 0."""
-        late_s = self.came_mono_s - self.t_mono_s
-        return late_s if late_s > OLD_S and self.is_eye(now_s) else 0.0
+        return self.counts and now_s - self.came_mono_s <= BLIND_S and self.came_mono_s - self.t_mono_s <= LATE_S
 
 
 def largest_speed(sees_enough_for_m_s: float) -> float:
@@ -139,8 +148,9 @@ class Regions:
             sensor=status.sensor,
             t_mono_s=status.t_mono_s,
             came_mono_s=before.came_mono_s if before is not None and again else now_s,
+            ages_s=_ages_s(status, before, None if again else now_s),
             counts=status.state == "running",
-            flowed_t_mono_s=_flowed_t_s(status, before),
+            flowed_mono_s=_flowed_s(status, before, now_s),
             why=status.text,
             occupied=occupied,
             distance_m=found_m,
@@ -161,12 +171,13 @@ class Regions:
 
     def occupied(self, now_s: float) -> tuple[Sight, ...]:
         """Sights with something in the way, late ones as well, nearest first."""
-        found = [s for s in self.sights.values() if s.counts and s.occupied and now_s - s.t_mono_s <= LATE_S]
+        found = [sight for sight in self.eyes(now_s) if sight.occupied]
         return tuple(sorted(found, key=lambda sight: sight.distance_m or 0.0))
 
     def seen_by(self, now_s: float) -> frozenset[Sensor]:
-        """Sensors that see something in the way."""
-        return frozenset(sight.sensor for sight in self.occupied(now_s))
+        """Sensors that see something in the way: late ones only where no other does."""
+        found = self.occupied(now_s)
+        return frozenset(sight.sensor for sight in [s for s in found if s.is_fresh(now_s)] or found)
 
     def rely(self) -> None:
         """From now on a map that begins anew has forgotten something."""
@@ -209,13 +220,11 @@ class Regions:
     def silent(self, engaged: frozenset[Sensor], now_s: float) -> Sight | None:
         """Of the sensors that are counted on: one that has sent no frame for too long, or none that can be placed."""
         sights = (self.sights[sensor] for sensor in engaged)
-        return next((sight for sight in sights if now_s - sight.flowed_t_mono_s > OLD_S), None)
+        return next((sight for sight in sights if sight.is_late or now_s - sight.flowed_mono_s > OLD_S), None)
 
     def stopping(self, sight: Sight) -> Stopping:
         """Before what this sensor sees."""
-        came_after_s = sight.came_mono_s - sight.t_mono_s
-        seen_after_s = max(sight.latency_s, came_after_s if came_after_s > OLD_S else 0.0)
-        latency_s = max(LEAST_LATENCY_S, seen_after_s + REACTION_S) + sight.period_s
+        latency_s = max(LEAST_LATENCY_S, max(sight.latency_s, sight.late_s) + REACTION_S) + sight.period_s
         return stopping_of(self.settings, sight.sensor, latency_s=latency_s)
 
     def eyes(self, now_s: float) -> list[Sight]:
@@ -258,16 +267,24 @@ def _has_seen_clear(sight: Sight) -> bool:
     return sight.clear_frames >= CLEAR_FRAMES and not sight.forgot
 
 
-def _flowed_t_s(status: PerceptionStatus, before: Sight | None) -> float:
-    if status.state in ("running", "blind"):
-        return status.t_mono_s
-    return -math.inf if before is None else before.flowed_t_mono_s
+def _ages_s(status: PerceptionStatus, before: Sight | None, came_mono_s: float | None) -> tuple[float, ...]:
+    """``came_mono_s``: None where the same frame is told again."""
+    known = () if before is None else before.ages_s
+    if came_mono_s is None or status.state != "running":
+        return known
+    return (*known, came_mono_s - status.t_mono_s)[-JUDGED_FRAMES:]
+
+
+def _flowed_s(status: PerceptionStatus, before: Sight | None, now_s: float) -> float:
+    if status.state in ("running", "blind") and (before is None or status.t_mono_s != before.t_mono_s):
+        return now_s
+    return -math.inf if before is None else before.flowed_mono_s
 
 
 def _period_s(status: PerceptionStatus, before: Sight | None) -> float:
     if before is None or not before.counts or status.state != "running":
         return 0.0 if before is None else before.period_s
-    return max(min(status.t_mono_s - before.t_mono_s, OLD_S), PERIOD_FADES * before.period_s)
+    return max(min(status.t_mono_s - before.t_mono_s, BLIND_S), PERIOD_FADES * before.period_s)
 
 
 def _since_s(status: PerceptionStatus, before: Sight | None) -> float:

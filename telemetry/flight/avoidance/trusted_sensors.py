@@ -18,8 +18,9 @@ class TrustedSensors:
         self.sensors: frozenset[Sensor] = frozenset()
 
     def join(self, now_s: float) -> None:
-        """Whoever sees something now is counted on, too."""
-        self.sensors |= self._regions.seen_by(now_s)
+        """Whoever sees something now is counted on, too; not who is late and would keep it from ever being clear."""
+        fresh = [sight.sensor for sight in self._regions.occupied(now_s) if sight.is_fresh(now_s)]
+        self.sensors |= frozenset(fresh)
 
     def say_clear(self, now_s: float) -> bool:
         return self._regions.is_clear(self.sensors, now_s)
@@ -46,14 +47,15 @@ class TrustedSensors:
 
     def blind(self, state: VehicleState, now_s: float) -> str:
         """Why nothing can be told about what is ahead now; empty while all is well."""
-        sight = self._regions.oldest(self.sensors, now_s)
-        advice = "It climbs on by itself once something comes. Or return home."
-        missing = ""
+        sight, missing = self._regions.oldest(self.sensors, now_s), ""
         if sight is not None:
-            missing = f"{_late(sight, now_s) or f'Nothing new from {SENSOR_WORDS[sight.sensor]}.'} {advice}"
-        if not self.sensors and not self._regions.counted(now_s):
-            missing = f"No sensor sees ahead. {advice}"
-        return _old_position(state, now_s) or missing
+            missing = f"Nothing new from {SENSOR_WORDS[sight.sensor]}. It climbs on by itself once something comes."
+        elif not self.sensors and not self._regions.counted(now_s):
+            sight = next(iter(self._regions.eyes(now_s)), None)
+            missing = "No sensor sees ahead. It climbs on by itself once something comes."
+        if sight is not None and (late := _late(sight, now_s)):
+            missing = f"{late} It climbs on by itself once they come in time."
+        return _old_position(state, now_s) or (missing and f"{missing} Or return home.")
 
     def silent(self, state: VehicleState, now_s: float) -> str:
         """The same where a camera may see nothing, as in the open sky, but must look."""
@@ -70,7 +72,8 @@ def _silence(sight: Sight, now_s: float) -> str:
 
 
 def _late(sight: Sight, now_s: float) -> str:
-    return f"Frames from {SENSOR_WORDS[sight.sensor]} come over {OLD_S:g} s late." if sight.late_s(now_s) else ""
+    is_late = sight.is_late and sight.is_eye(now_s)
+    return f"Frames from {SENSOR_WORDS[sight.sensor]} come over {OLD_S:g} s late." if is_late else ""
 
 
 def _old_position(state: VehicleState, now_s: float) -> str:

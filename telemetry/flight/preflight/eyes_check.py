@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from mapping.perceiving.braking import Braking
-from telemetry.flight.avoidance.regions import SENSOR_WORDS, largest_speed
+from telemetry.flight.avoidance.regions import OLD_S, SENSOR_WORDS, largest_speed
 from telemetry.flight.preflight.checks import Row
 from telemetry.flight.preflight.parameters import Speeds
 from telemetry.topics.obstacles import AvoidanceStatus, Eye
@@ -23,6 +23,9 @@ def avoidance_row(status: AvoidanceStatus, speeds: Speeds, braking: Braking, *, 
         return Row("avoidance", "accept", BLIND, "Switch a sensor on, or tick that it is flown without.")
     largest_m_s = min(eye.largest_speed_m_s for eye in status.eyes)
     text = " ".join(_eye_words(eye, utc_minus_mono_s) for eye in status.eyes)
+    if late := [SENSOR_WORDS[eye.sensor] for eye in status.eyes if eye.is_late]:
+        text += f" Frames from {' and '.join(late)} come over {OLD_S:g} s late: it brakes later, and then holds."
+        return Row("avoidance", "accept", text, "End what else runs on this computer, or mend the way to the sensor.")
     jerk = speeds.brake_jerk_m_s3
     if jerk is not None and jerk < braking.jerk_m_s3 - SLOWER:
         text += f" The vehicle brakes with a jerk of {jerk:g} m/s\u00b3, {braking.jerk_m_s3:g} are counted on."
