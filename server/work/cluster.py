@@ -93,13 +93,15 @@ def _answer(future: Any, tell: Callable[[], None]) -> Any:
     """Raises what the piece raised, ClusterError when the scheduler is gone."""
     from distributed import CancelledError
 
+    had_failed = False
     while True:
         tell()
         try:
             return future.result(timeout=_TOLD_EVERY_S)
         except TimeoutError:
-            if future.status == "error":
-                return future.result()  # raises the piece's own, which may have come just now
+            if had_failed:
+                raise  # the piece's own
+            had_failed = future.status == "error"  # perhaps just now: then the next look raises what it raised
         except (CancelledError, OSError) as error:
             if future.status == "error":
                 raise

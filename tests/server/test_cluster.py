@@ -107,8 +107,11 @@ def test_what_a_piece_raised_just_after_it_was_looked_at_is_told_as_it_is() -> N
     class Late:
         status = "error"
 
-        def result(self, timeout: float | None = None) -> None:
-            raise TimeoutError if timeout is not None else PoiError("outside")
+        looks = 0
+
+        def result(self, timeout: float) -> None:
+            self.looks += 1
+            raise TimeoutError if self.looks == 1 else PoiError("outside")
 
     with pytest.raises(PoiError, match="outside"):
         cluster._answer(Late(), lambda: None)
