@@ -81,13 +81,14 @@ def run_job(
     """
     with (directory / "stderr").open("w+b") as stderr:
         worker = _start(directory, stderr, *pipe)
-        clock = _Deadline(worker, max(_START_S, limits.header_s))
+        clock, is_ready = _Deadline(worker, _START_S), False
         try:
             bounds = {"memory_bytes": limits.max_memory_bytes, "cpu_s": int(limits.decode_s) + 1}
             _send(worker, {"writable": [str(directory)], **job, **bounds})
             for message in _messages(worker):
                 kind = message.pop("type")
-                if kind == "ready":
+                if kind == "ready" and not is_ready:
+                    is_ready = True
                     clock.extend(limits.header_s)
                 elif kind == "header":
                     order = on_header(message) if on_header else {}
@@ -102,10 +103,10 @@ def run_job(
                     what, advice = (_public(message[part], directory, where) for part in ("what", "advice"))
                     raise error(what, where=where, advice=advice)
             worker.wait()
-            raise _death(worker.returncode, late_after_s=clock.passed_s, where=where, smaller=smaller)
+            raise _death(worker.returncode, clock.passed_s, is_ready=is_ready, where=where, smaller=smaller)
         except BrokenPipeError as error:
             worker.wait()
-            raise _death(worker.returncode, late_after_s=clock.passed_s, where=where, smaller=smaller) from error
+            raise _death(worker.returncode, clock.passed_s, is_ready=is_ready, where=where, smaller=smaller) from error
         finally:
             clock.stop()
             _end(worker)
@@ -164,7 +165,13 @@ def _end(worker: subprocess.Popen[bytes]) -> None:
     worker.wait()
 
 
-def _death(returncode: int, *, late_after_s: float | None, where: str, smaller: str) -> RasterError:
+def _death(returncode: int, late_after_s: float | None, *, is_ready: bool, where: str, smaller: str) -> RasterError:
+    if late_after_s is not None and not is_ready:
+        return RasterError(
+            f"The decoder did not start within {late_after_s:.0f} s: this computer has too much else to do.",
+            where=where,
+            advice="Try again when less runs on it.",
+        )
     if late_after_s is not None:
         return RasterTooLargeError(
             f"Decoding took more than {late_after_s:.0f} s and was stopped.",
