@@ -105,18 +105,27 @@ def _run(name: str, runtime_dir: Path, main: NodeMain, context: NodeContext) -> 
 
 
 async def _live(name: str, runtime_dir: Path, main: NodeMain, context: NodeContext) -> None:
-    asked = asyncio.Event()
+    asked = False
+    working: asyncio.Future[object] | None = None
+
+    def end() -> None:
+        nonlocal asked
+        asked = True
+        if working is not None:
+            working.cancel()
+
     for number in (signal.SIGTERM, signal.SIGINT):  # from here on, also while it joins the bus
-        asyncio.get_running_loop().add_signal_handler(number, asked.set)
+        asyncio.get_running_loop().add_signal_handler(number, end)
     async with await Bus.open(runtime_dir, name) as bus:
+        if asked:
+            return
         working = asyncio.ensure_future(main(bus, context))
         listening = asyncio.ensure_future(_watch_server(bus, context))
-        ending = asyncio.ensure_future(asked.wait())
-        done, others = await asyncio.wait((working, listening, ending), return_when=asyncio.FIRST_COMPLETED)
+        done, others = await asyncio.wait((working, listening), return_when=asyncio.FIRST_COMPLETED)
         for task in others:
             task.cancel()
         await asyncio.gather(*others, return_exceptions=True)
-        for task in (*done, working):
+        for task in done:
             if not task.cancelled():
                 task.result()
 
