@@ -3,7 +3,13 @@ import { slowestOf } from "../src/plan/SeesEnough";
 import { obstacles } from "../src/store/obstacles";
 
 const known = { ...obstacles.live.value, sees_enough: { radar: 4.17, vision: 2.94, ranges: 3.1 } };
-const eye = { sensor: "radar" as const, depth_m: 15, since_t_mono_s: 0, largest_speed_m_s: 6.03, is_late: false };
+const eye = {
+  sensor: "radar" as const,
+  depth_m: 15,
+  since_t_mono_s: 0,
+  largest_speed_m_s: 6.03,
+  is_late: false,
+};
 
 test("without a sensor nothing is said", () => {
   expect(slowestOf(known, [])).toBeNull();
