@@ -184,7 +184,10 @@ def test_a_home_that_moved_has_its_return_judged_without_anybody_asking(
             assert first is not None
             assert any(state.is_judging_return for state in bench.told)
             bench.moves(-400.0)
-            await shows(lambda: bench.desk.state.ret not in (None, first))
+            moved = bench.desk.state.ret
+            assert moved is not None
+            assert [reason.text for reason in moved.reasons] == ["Home has moved again."]
+            await shows(lambda: bench.desk.state.ret not in (None, first, moved))
             newest = bench.desk.state.ret
             assert newest is not None
             assert newest.state != "certified"
@@ -259,6 +262,7 @@ def test_a_certified_return_is_judged_again_where_sensors_see_something_in_its_w
     async def scenario() -> None:
         monkeypatch.setattr(home_desk, "NEW_MAP_S", 0.0)
         monkeypatch.setattr(home_desk, "LOOK_EVERY_S", 0.02)
+        monkeypatch.setattr(home_desk, "PAUSE_SHARE", 0.0)  # a first judgement takes long: its worker starts
         bench = Bench(made, lane)
         radar = bench.watch.mirrors["radar"]
         home = home_of(bench.state)
