@@ -187,8 +187,9 @@ def test_nothing_else_is_asked_for(server: Server, address: str) -> None:
 )
 def test_what_a_server_does_wrong_is_said(server: Server, fault: str, words: str) -> None:
     server.fault = fault
+    hasty: dict[str, Any] = {"drips": {"request_s": 0.4}, "silent": {"timeout_s": 0.2}}
     with pytest.raises(RasterError, match=words):
-        remote(server, **{"drips": {"request_s": 0.4}, "silent": {"timeout_s": 0.2}}.get(fault, {}))
+        remote(server, **hasty.get(fault, {}))
     assert all(path == "/dsm/model.tif" for path, _ in server.asked)
 
 

@@ -19,8 +19,9 @@ class TrustedSensors:
 
     def join(self, now_s: float) -> None:
         """Whoever sees something now is counted on, too; not who is late and would keep it from ever being clear."""
-        fresh = [sight.sensor for sight in self._regions.occupied(now_s) if sight.is_fresh(now_s)]
-        self.sensors |= frozenset(fresh)
+        seen = self._regions.occupied(now_s)
+        fresh: frozenset[Sensor] = frozenset(sight.sensor for sight in seen if sight.is_fresh(now_s))
+        self.sensors |= fresh
 
     def say_clear(self, now_s: float) -> bool:
         return self._regions.is_clear(self.sensors, now_s)
