@@ -63,6 +63,7 @@ class ObstacleDesk:
         self._root, self._watches, self._manoeuvres, self._around = root, watches, manoeuvres, around
         self._link, self._plans, self._lane, self._lease, self._bus = link, plans, lane, lease, bus
         self._live = watches["live"]
+        self._clearing = asyncio.Lock()
         self._avoid_when_adopted = False
         """Of the demo's simulated vehicle: it climbs over what stands in its way."""
         self._kept = PerceptionSettings()
@@ -126,10 +127,11 @@ class ObstacleDesk:
 
     async def clear(self) -> None:
         """Before any node hears of it, nothing that is told counts any more."""
-        clear_count = self._live.settings.clear_count + 1
-        await self._live.dismiss(clear_count)
-        self._set(replace(self._live.settings, clear_count=clear_count))
-        await self._keep(replace(self._kept, clear_count=clear_count))
+        async with self._clearing:  # two orders have two numbers
+            clear_count = self._live.settings.clear_count + 1
+            await self._live.dismiss(clear_count)
+            self._set(replace(self._live.settings, clear_count=clear_count))
+            await self._keep(replace(self._kept, clear_count=clear_count))
 
     async def fly(self, operator: Operator, manoeuvre_id: str) -> None:
         """Raises NotFoundError for one that is out of date, and what the link says."""

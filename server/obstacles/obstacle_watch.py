@@ -46,6 +46,8 @@ LATE_S = 2.0
 """So long after its newest part a map that is not complete is asked for."""
 DEAD_S = 3.0
 """Nodes say at least once a second how they are."""
+_HAD_SEEN: dict[Sensor, str] = {"radar": "it had seen", "vision": "its newest frame saw", "ranges": "it had seen"}
+"""The camera's map is made anew at every frame."""
 _UNTIL = "until the landing, or until you empty the maps"
 _NOBODY_WATCHES = {
     "blind": "Avoidance sees nothing any more: nothing brakes by itself. Pause, or steer clear yourself.",
@@ -301,7 +303,7 @@ class Watch:
             self._tell_lasting(
                 f"kept-{name}",
                 name,
-                f"The {name} map began anew: what it had seen counts for ways and returns {_UNTIL}.",
+                f"The {name} map began anew: what {_HAD_SEEN[name]} counts for ways and returns {_UNTIL}.",
                 over=f"Nothing that the {name} saw before counts any more.",
                 holds=mirror.kept_count > 0,
             )

@@ -25,6 +25,8 @@ from telemetry.flight.home_watch import home_of_takeoff
 from telemetry.topics.deltas import packed_keys
 from telemetry.topics.obstacles import SENSORS, ObstacleAlert, Sensor
 
+SAME_M = 1.5
+"""What is seen so near to what was seen before is the same thing: positions wander, and frames differ."""
 COMES_WITHIN_S, LOOK_S = 10.0, 0.02
 """The largest map that is told comes in eight seconds."""
 _UNKNOWN = "what stands in the way is not known"
@@ -90,8 +92,8 @@ def is_same_seen(one: Sequence[Voxels], other: Sequence[Voxels]) -> bool:
 def is_more_seen_near(
     before: Sequence[Voxels], now: Sequence[Voxels], line_deg: Sequence[tuple[float, float]], within_m: float
 ) -> bool:
-    """Whether sensors see things by now that they had not seen, and that the surface model does not explain, so near to
-    a line (lat_deg, lon_deg) over ground. For a thread, as ``is_same_seen``."""
+    """Whether sensors see things by now farther than ``SAME_M`` from all that they had seen, and that the surface model
+    does not explain, so near to a line (lat_deg, lon_deg) over ground. For a thread, as ``is_same_seen``."""
     lat_deg, lon_deg = np.array(line_deg).T
     for map_ in now:
         if (origin := map_.origin) is None:
@@ -99,19 +101,44 @@ def is_more_seen_near(
         frame = LocalFrame(origin.lat_deg, origin.lon_deg, origin.alt_amsl_m)
         line_m = frame.to_enu(lat_deg, lon_deg, origin.alt_amsl_m)[:, :2]
         is_open = ~map_.explained
-        near = _is_near(map_.centres_enu_m[is_open][:, :2], line_m, within_m + map_.resolution_m)
+        centres = map_.centres_enu_m[is_open]
+        near = _is_near(centres[:, :2], line_m, within_m + map_.resolution_m)
         grid = map_.sensor, origin, map_.resolution_m
         known = [packed_keys(a.keys[~a.explained]) for a in before if (a.sensor, a.origin, a.resolution_m) == grid]
-        if not _are_among(packed_keys(map_.keys[is_open][near]), np.concatenate([np.zeros(0, np.int64), *known])):
+        fresh = ~_are_among(packed_keys(map_.keys[is_open][near]), np.concatenate([np.zeros(0, np.int64), *known]))
+        if fresh.any() and not _are_beside(centres[near][fresh], _seen_enu_m(before, frame)):
             return True
     return False
 
 
-def _are_among(numbers: I64, known: I64) -> bool:
-    """Whether all are. Of millions, sorting is faster than ``np.isin``."""
+def _seen_enu_m(maps: Sequence[Voxels], frame: LocalFrame) -> F64:
+    """(N, 3) centres of what the surface model does not explain, of all maps, from the origin of ``frame``."""
+    seen = [np.zeros((0, 3))]
+    for map_ in maps:
+        if (origin := map_.origin) is not None:
+            shift = frame.to_enu(origin.lat_deg, origin.lon_deg, origin.alt_amsl_m)
+            seen.append(map_.centres_enu_m[~map_.explained] + shift)
+    return np.concatenate(seen)
+
+
+def _are_beside(points_m: F64, known_m: F64) -> bool:
+    """Whether each of (N, 3) lies within ``SAME_M`` of one of (M, 3)."""
+    low, high = points_m.min(axis=0) - SAME_M, points_m.max(axis=0) + SAME_M
+    known_m = known_m[((known_m >= low) & (known_m <= high)).all(axis=1)]
+    if not len(known_m):
+        return False
+    from scipy.spatial import KDTree
+
+    return bool(np.isfinite(KDTree(known_m).query(points_m, distance_upper_bound=SAME_M)[0]).all())
+
+
+def _are_among(numbers: I64, known: I64) -> Bools:
+    """Which are. Of millions, sorting is faster than ``np.isin``."""
     known = np.sort(known)
     at = np.searchsorted(known, numbers)
-    return bool((at < len(known)).all() and (known[at] == numbers).all())
+    among = at < len(known)
+    among[among] = known[at[among]] == numbers[among]
+    return among
 
 
 def _is_near(points_m: F64, line_m: F64, within_m: float) -> Bools:

@@ -246,8 +246,8 @@ class MapMirror:
         if self._flies and self.origin is not None and not self._is_of_before:
             for chunks in (self._chunks, self._retold or {}):
                 self._kept.keep((self.origin, self.resolution_m), _unexplained_ids(chunks))
-            # What is known to have been told and never came was seen, too.
-            self._kept.is_over_full |= self._lacks
+            # What never came of it was seen, too; of a retelling the map before it is here, whole.
+            self._kept.is_over_full |= self._lacks or (self._parts_in < self._parts and self._retold is None)
         self._forget()
         self._retold, self._is_of_before = None, False
         if (self.origin, self.resolution_m) != (delta.origin, delta.resolution_m):

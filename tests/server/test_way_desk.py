@@ -9,8 +9,10 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
+from mapping.geometry.frames import moved_deg
 from planning.errors import ParameterError
 from planning.fence.fence_model import Fence, circle
 from planning.formats.fence_items import fence_items
@@ -21,6 +23,7 @@ from server.flying.in_flight.way_task import WayJudged, wish_of
 from server.heard.channel import Channel, ShownWay
 from server.obstacles.obstacle_watch import Watch
 from server.obstacles.surroundings import is_more_seen_near
+from server.scene.mirror import MapMirror
 from server.schemas import FenceDoc, FlyWayBody, GuidedState, PlaceDoc, WayBody, WayDoc, WaySpeedBody
 from server.schemas.flight_docs import CHECK_FRESH_S
 from server.work.jobs import Lane
@@ -251,6 +254,33 @@ def test_a_way_near_which_more_is_seen_since_it_was_judged_is_not_flown(
         assert isinstance(bench.vehicle.told[-1], FlyWay)
 
     runner.run(scenario())
+
+
+def test_what_is_seen_again_a_little_elsewhere_is_the_same_thing() -> None:
+    """A camera's map is made anew at every frame, by a vehicle that wanders; a map begun anew has another origin."""
+    rng, home = np.random.default_rng(5), MapOrigin(46.0, 7.0, 500.0)
+    lat_deg, lon_deg = moved_deg((46.0, 7.0), 40.0, 3.0)
+    elsewhere, shift_m = MapOrigin(lat_deg, lon_deg, 502.0), np.array([40.0, 3.0, 2.0])
+    line = [(46.0, 7.0), moved_deg((46.0, 7.0), 0.0, 60.0)]
+    east, up = np.meshgrid(np.arange(-5.0, 5.0, 0.2), np.arange(0.0, 8.0, 0.2))
+    wall = np.column_stack([east.ravel(), np.full(east.size, 6.0), up.ravel()])
+
+    def frame(*more: tuple[float, float, float], origin: MapOrigin = home) -> tuple[Any, ...]:
+        mirror = MapMirror("vision")
+        seen = np.concatenate([wall, np.reshape(more, (-1, 3))]) + rng.uniform(-0.15, 0.15, 3)
+        seen += rng.normal(0.0, 0.05, seen.shape) - (shift_m if origin is elsewhere else 0.0)
+        keys = {(int(x), int(y), int(z)) for x, y, z in np.floor(seen / 0.5)}
+        mirror.fold(delta(sorted(keys), whole=True, origin=origin, resolution_m=0.5))
+        found = mirror.seen()
+        assert found is not None
+        return found
+
+    judged_by = frame()
+    assert not any(is_more_seen_near(judged_by, frame(), line, 28.0) for _ in range(30))
+    assert not is_more_seen_near(judged_by, frame(origin=elsewhere), line, 28.0)
+    assert is_more_seen_near(judged_by, frame((0.0, 3.0, 4.0)), line, 28.0), "it stands before the wall"
+    assert is_more_seen_near(judged_by, frame((0.0, 3.0, 4.0), origin=elsewhere), line, 28.0)
+    assert not is_more_seen_near(judged_by, frame((0.0, 100.0, 4.0)), line, 28.0), "far from the way"
 
 
 def test_who_walks_about_beside_a_take_off_is_no_matter_unless_he_is_near_it(

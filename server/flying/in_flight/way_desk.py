@@ -79,7 +79,7 @@ class WayDesk:
         self._link, self._live, self._workspace, self._library = link, live, workspace, library
         self._lane, self._watch, self._pages = lane, watch, pages
         self._in_hand: _InHand | None = None
-        self._is_judging = False
+        self._is_judging = self._is_ordering = False
         self._adopted: str | None = None
 
     @property
@@ -113,6 +113,15 @@ class WayDesk:
     async def fly(self, operator: Operator, body: FlyWayBody) -> None:
         """Raises NotFoundError, NotCertifiedError, CheckNeededError where home was moved or more was seen since, and
         NotAllowedError where the vehicle is elsewhere by now."""
+        if self._is_ordering:
+            raise ConflictError("A way is being ordered.", advice="Wait until it is flown or refused.")
+        self._is_ordering = True
+        try:
+            await self._order(operator, body)
+        finally:
+            self._is_ordering = False
+
+    async def _order(self, operator: Operator, body: FlyWayBody) -> None:
         in_hand = self._in_hand
         if in_hand is None or in_hand.doc.id != body.id or in_hand.doc.flies:
             raise NotFoundError(NOWHERE, advice="Ask for the way again.")

@@ -12,7 +12,7 @@ from planning.guided.guided_model import Back, GoTo, GuidedWay, Look, Orbit, Ral
 from server.scene.mirror import Voxels
 from server.schemas import PlanDoc, WayBody
 from server.work.jobs import Progress
-from telemetry.flight.home_watch import HomePlace
+from telemetry.flight.home_watch import HomePlace, home_of
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.topics.onboard_lists import PlacesOnboard
 from telemetry.topics.vehicle import VehicleState
@@ -75,8 +75,10 @@ def judge_way(asked: WayAsked, *, report: Progress) -> WayJudged:
         wish = replace(wish, point=nearest_rally(rally, asked.state))
     speed_m_s = asked.body.speed_m_s or demands.profile.mean_speed_m_s
     ground = load_terrain(asked.terrain)
-    off_m = home_off_m(ground, asked.took_off, asked.state) if is_in_the_air(asked.state) else 0.0
-    seen = with_seen(ground, asked.terrain, asked.document.seen_id, asked.maps, asked.state, asked.took_off)
+    flies = is_in_the_air(asked.state)
+    took_off = asked.took_off if flies else home_of(asked.state)  # on the ground the last take-off's is of no matter
+    off_m = home_off_m(ground, took_off, asked.state) if flies else 0.0
+    seen = with_seen(ground, asked.terrain, asked.document.seen_id, asked.maps, asked.state, took_off)
     way = judged_way(
         part_for(ground, asked.state, wish, rally),
         None if seen is None else part_for(seen, asked.state, wish, rally),
