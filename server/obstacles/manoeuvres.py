@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from mapping.geometry.frames import apart_m
 from server.errors import NotFoundError, reported
 from server.obstacles.manoeuvre_situation import Prepared, impossible
 from server.obstacles.manoeuvre_task import prepare
-from server.obstacles.surroundings import Surroundings
+from server.obstacles.surroundings import Surroundings, are_maps_whole
 from server.scene.layers.region_layers import Route
 from server.schemas import ManoeuvreDoc
 from server.work.jobs import Lane
@@ -24,6 +25,7 @@ from telemetry.topics.requests import FlyManoeuvre, MayFlyManoeuvre, Operator
 log = logging.getLogger("hedgehop.obstacles")
 
 NOTHING_KNOWN = "The plan that is flown, its surface model, or home is not known here. Hold, or steer clear by sight."
+PARTS_MISSING = "Parts of a map are missing: look before you fly it."
 KINDS = ("obstacle", "conflict", "approach")
 AGAIN_AFTER_S = 1.0
 """While the obstacle stands in the region: the vehicle moves, and more of it is seen."""
@@ -142,6 +144,8 @@ class Manoeuvres:
                 return
             self._busy("" if self.prepared else "Looking for a way past the obstacle")
             prepared = tuple([await self._allowed(each) for each in await self._lane.call(prepare, situation)])
+            if not are_maps_whole(self._watch):
+                prepared = tuple(map(_over_parts, prepared))
         except Exception as error:
             doc = reported(error, log, "Preparing a manoeuvre")
             log.warning("No manoeuvre: %s", doc.what)
@@ -174,6 +178,13 @@ class Manoeuvres:
         ]
         self._watch.manoeuvres = [each.doc for each in prepared]
         self._watch.refresh()
+
+
+def _over_parts(found: Prepared) -> Prepared:
+    """Of maps of which not all is known here."""
+    if not found.doc.possible:
+        return found
+    return replace(found, doc=found.doc.model_copy(update={"text": f"{found.doc.text} {PARTS_MISSING}"}))
 
 
 def _none(why: str, standing: ObstacleAlert | None, moving: ObstacleAlert | None) -> tuple[Prepared, ...]:

@@ -113,6 +113,14 @@ def test_they_come_with_the_alert_and_go_with_it() -> None:
         desk.request("over-radar-1")
 
 
+def test_what_is_offered_over_half_a_map_says_so() -> None:
+    desk = Desk((prepared("over"), prepared("around", possible=False)))
+    desk.watch.mirrors["radar"].expect()
+    desk.manoeuvres.on_alert(alert())
+    asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
+    assert [doc.text for doc in desk.watch.state.manoeuvres] == [f"Climb. {manoeuvres.PARTS_MISSING}", "Climb."]
+
+
 def test_what_the_link_would_refuse_is_not_offered_and_its_words_are_the_reason() -> None:
     desk = Desk((prepared("over"), prepared("around"), prepared("sidestep", possible=False)))
     desk.refusals["over"] = "Beyond the fence. Fly another way, or return."
