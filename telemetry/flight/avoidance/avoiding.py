@@ -19,7 +19,8 @@ from telemetry.flight.avoidance.detour import Detour
 from telemetry.flight.avoidance.detour_state import DetourParams
 from telemetry.flight.avoidance.fence_aboard import FenceAboard
 from telemetry.flight.avoidance.pilot_watch import PilotWatch
-from telemetry.flight.avoidance.regions import FASTER_M_S, Regions, Sight, braking_of, largest_speed
+from telemetry.flight.avoidance.regions import Regions, Sight, braking_of, largest_speed
+from telemetry.flight.avoidance.slowing import Slowing
 from telemetry.flight.guided.helm import Helm, from_the_same_home
 from telemetry.flight.guided.remaining_mission import RemainingMission
 from telemetry.mavlink.actions import Action, Message
@@ -33,8 +34,6 @@ from telemetry.topics.vehicle import VehicleState
 LOW_M = 1.0
 SHORT_M = 1.0
 """Left between the vehicle's hull and what it stops short of."""
-AGAIN_S = 2.0
-"""A vehicle that is still too fast, or again because its mission says so, is told once more."""
 
 
 class Avoiding:
@@ -354,37 +353,6 @@ class Avoiding:
         was_engaged = self.is_engaged
         self.stop()
         return self._helm.stop(now_s) if was_engaged and state.mode == self._helm.guided_mode else []
-
-
-class Slowing:
-    """Of a flight that is faster than its sensors see far enough to stop for.
-
-    ``look`` is called whenever anything is new. A flight that was slowed stays so, whatever is seen later.
-    """
-
-    def __init__(self, helm: Helm) -> None:
-        self._helm = helm
-        self.asked_m_s: float | None = None
-        self.as_late = False
-        """It was slowed while frames came late."""
-        self._asked_s = -math.inf
-        self._mode = ""
-
-    def on_state(self, state: VehicleState) -> None:
-        """Another mode has speeds of its own."""
-        if state.mode != self._mode:
-            self._mode, self.asked_m_s, self._asked_s, self.as_late = state.mode, None, -math.inf, False
-
-    def look(self, state: VehicleState, largest_m_s: float, now_s: float, *, is_late: bool) -> list[Action]:
-        """In a mode that is flown by no pilot."""
-        speed_m_s = state.ground_speed_m_s or 0.0
-        wanted_m_s = largest_speed(largest_m_s)
-        if speed_m_s <= wanted_m_s + FASTER_M_S or now_s - self._asked_s < AGAIN_S:
-            return []
-        actions = self._helm.slow_down(wanted_m_s, now_s)
-        if actions:
-            self.asked_m_s, self._asked_s, self.as_late = wanted_m_s, now_s, is_late
-        return actions
 
 
 def _check_targets(targets: tuple[GuidedTarget, ...]) -> None:
