@@ -35,7 +35,7 @@ _EMPTY = "It counts again after the landing, or once you empty the maps."
 
 
 async def seen_maps(watch: Watch, within_s: float | None = None) -> tuple[Voxels, ...]:
-    """What each sensor has seen in this flight, all of it: a map that is just being told is waited for.
+    """What each sensor has seen in this flight, of the camera its newest frame: a map that is just told is waited for.
 
     Raises NotReadyError where that does not come (``within_s``; None: as long as the largest takes), or was too much to
     be kept.
