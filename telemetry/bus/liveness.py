@@ -53,10 +53,11 @@ class Liveness:
         self._looked_s = now_s
         if facts.pid != self._pid:
             self._pid, self._proofs, self._proved_s = facts.pid, 0, 0.0
-        if facts.proved_t_mono_s != self._proved_s:
+        # Before its first proof is kept, the file's time is that of the wall clock, which proves nothing.
+        if self._proved_s != facts.proved_t_mono_s <= now_s:
             self._proved_s, self._cpu_s = facts.proved_t_mono_s, _cpu_s(facts.pid)
             self._proofs += 1
-        silent_s = now_s - max(facts.proved_t_mono_s, self._awake_s)
+        silent_s = now_s - max(self._proved_s, self._awake_s)
         if silent_s < min(SILENT_S, self._hung_s):
             return Silence()
         return Silence(silent_s, silent_s >= self._patience_s(silent_s))

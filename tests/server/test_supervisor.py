@@ -324,9 +324,9 @@ def test_a_link_that_hangs_is_said_then_killed_and_started_again(
             if how == "stopped":
                 # On a busy machine one that is only slow to start may have been ended before.
                 await until(lambda: (s := watched.state("link")) is not None and s.state == "running")
+                await proved(folder)
                 facts = running_node(folder, "link")
                 assert facts is not None
-                await until(lambda: proved_s(folder) > facts.proved_t_mono_s)
                 state = watched.state("link")
                 assert state is not None
                 restarts = state.restarts
@@ -358,7 +358,7 @@ def test_a_node_that_is_silent_for_a_moment_goes_on(folder: Path, monkeypatch: p
         async with supervised(folder) as watched:
             await watched.supervisor.start("link", [])
             facts = await watched.running("link")
-            await until(lambda: proved_s(folder) > facts.proved_t_mono_s)
+            await proved(folder)
             os.kill(facts.pid, signal.SIGSTOP)
             await until(lambda: (s := watched.state("link")) is not None and s.state == "silent")
             os.kill(facts.pid, signal.SIGCONT)
@@ -368,7 +368,12 @@ def test_a_node_that_is_silent_for_a_moment_goes_on(folder: Path, monkeypatch: p
     run(whole)
 
 
-def proved_s(folder: Path) -> float:
-    """When the link proved last that it works."""
-    facts = running_node(folder, "link")
-    return 0.0 if facts is None else facts.proved_t_mono_s
+async def proved(folder: Path) -> None:
+    """Until the link has proved from now on that it works."""
+    since_s = time.monotonic()
+
+    def has_proved() -> bool:
+        facts = running_node(folder, "link")
+        return facts is not None and since_s < facts.proved_t_mono_s <= time.monotonic()
+
+    await until(has_proved)

@@ -68,6 +68,19 @@ def test_before_its_first_proof_it_may_load_what_it_needs(process: Process) -> N
     assert given_up_s(Liveness(), process, works=False) == pytest.approx(START_S, abs=0.15)
 
 
+def test_the_wall_clocks_time_of_what_it_has_just_written_is_no_proof(process: Process) -> None:
+    observer = Liveness()
+    observer.look(facts(PROVED_S + 1e9), PROVED_S)  # before its first proof
+    assert given_up_s(observer, process, works=False) == pytest.approx(START_S, abs=0.15)
+    observer = Liveness()
+    observer.look(facts(PROVED_S - 0.5), PROVED_S - 0.1)
+    observer.look(facts(), PROVED_S)
+    silences = [observer.look(facts(PROVED_S + 1e9), PROVED_S + tenth / 10) for tenth in range(40)]
+    assert not silences[9].silent_s
+    assert silences[11].silent_s == pytest.approx(1.1)
+    assert silences[31].is_hung
+
+
 def test_the_link_may_not_be_busy_for_long(process: Process) -> None:
     assert given_up_s(Liveness(busy_s=HUNG_S), process, 0.9) == pytest.approx(HUNG_S, abs=0.15)
 
