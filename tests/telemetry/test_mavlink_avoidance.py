@@ -19,6 +19,7 @@ from telemetry.topics.requests import FlyManoeuvre, Pause, Resume, ReturnHome, S
 from tests.telemetry.avoiding_bench import Wall, seen_at
 from tests.telemetry.link_bench import ME, Console, again_and_again, until
 from tests.telemetry.own_time import run
+from tests.telemetry.test_guided_over_link import way
 from tests.telemetry.test_mavlink_flights import (
     LAT_DEG,
     LON_DEG,
@@ -191,6 +192,27 @@ def test_the_scripts_flight_is_gone_on_with_higher_can_be_paused_and_ends_at_an_
             await phase(bench, "returning")
             await until(lambda: avoidance(bench).state == "watching")
             assert bench.flight.broke_off_at is not None
+
+    run(whole)
+
+
+def test_a_certified_way_that_avoidance_takes_over_at_once_was_accepted() -> None:
+    """It was once refused by "another command was given", while it was flown."""
+
+    async def whole() -> None:
+        async with before_a_wall() as (bench, simulator):
+            await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
+            await switch_on(bench)
+            await start(bench, StartGuided(ME, TARGETS, 10.0))
+            await taken_off(bench, simulator)
+            await until(lambda: avoidance(bench).state in ("climbing", "holding"))
+            await bench.handle(Pause(ME))
+            await until(lambda: (bench.state.ground_speed_m_s or 0.0) < 0.3 and bench.flight.phase == "paused")
+            await bench.handle(way(bench, *TARGETS[-1:]))
+            await until(lambda: avoidance(bench).state == "offset")
+            assert bench.flight.way == "guided"
+            await until(lambda: bench.flight.phase == "flying")
+            assert simulator.vehicle.truth.p_neu[2] > 17.0
 
     run(whole)
 

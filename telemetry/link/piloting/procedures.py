@@ -53,6 +53,8 @@ class Procedures:
         return self._current is not None and not self._current.task.done()
 
     def end(self) -> None:
+        """What shows that it was accepted has been, also where avoidance takes it over at once."""
+        self.on_tick()
         if self._current is not None:
             self._current.task.cancel()
             self._current = None
