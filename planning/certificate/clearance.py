@@ -31,9 +31,9 @@ from planning.certificate.certificate_model import (
     WorstPoint,
 )
 from planning.certificate.fenced import fence_reason, fence_verdict, rally_reasons
-from planning.certificate.heights import height_range
 from planning.certificate.home_ground import FREE_SLOPE, FREE_STEP_M
 from planning.certificate.home_stand import better_home, ground_at, ground_at_home, home_stand, lowered
+from planning.certificate.line_heights import height_range
 from planning.certificate.nearest import nearest_distances, threads_for
 from planning.certificate.pyramid import MaxPyramid, cells_pyramid
 from planning.certificate.reasons import (

@@ -76,7 +76,7 @@ class _Commands(_Lazy):
         "bag": (".maps.bag_command.bag", examples.BAG),
         "export": (".maps.export_command.export", examples.EXPORT),
         "traversability": (".traversability_command.traversability", examples.TRAVERSABILITY),
-        "agent": (".agent.command.agent", examples.AGENT),
+        "agent": (".agent.agent_command.agent", examples.AGENT),
         "audit": (".audit_command.audit", examples.AUDIT),
         "bench": ("bench", examples.BENCH),
         "params": ("", ""),

@@ -19,7 +19,7 @@ from server.flying.checklist_desk import ChecklistDesk
 from server.flying.in_flight.take_up_desk import TakingUp, with_words
 from server.flying.in_flight.take_up_task import AskedTakeUp, MadeTakeUp
 from server.flying.starting import Ready, check_firmware, check_goes_on, check_start, preflight_now
-from server.flying.uploading.uploads import Uploads
+from server.flying.uploading.mission_uploads import Uploads
 from server.flying.work import FlightWork
 from server.heard.channel import Channel
 from server.heard.onboard import Aboard

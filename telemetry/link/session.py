@@ -37,7 +37,7 @@ from telemetry.topics.obstacles import AvoidBy, PerceptionSettings
 from telemetry.topics.requests import SetHome
 from telemetry.topics.traffic import TrafficSettings
 from telemetry.topics.vehicle import VehicleState
-from telemetry.traffic.picture import TrafficPicture
+from telemetry.traffic.traffic_picture import TrafficPicture
 
 SETUP_TIMES, SETUP_EVERY_S = 5, 1.0
 OTHER_VEHICLE = (

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import get_num_threads
 
-from planning.certificate.heights import height_range
+from planning.certificate.line_heights import height_range
 from planning.certificate.nearest import SMALL_MODEL_PX, nearest_distances, threads_for
 from planning.certificate.pyramid import LEAF_PX, max_pyramid
 from planning.certificate.returns import return_altitude, return_altitudes

@@ -10,7 +10,7 @@ from affine import Affine
 
 from mapping.geometry.arrays import F32, F64
 from planning.certificate.around import cells_around
-from planning.certificate.heights import height_range
+from planning.certificate.line_heights import height_range
 from planning.certificate.nearest import nearest_distances
 from planning.certificate.pyramid import MaxPyramid, cells_pyramid
 from planning.certificate.returns import return_altitude

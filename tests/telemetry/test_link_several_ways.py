@@ -18,7 +18,7 @@ from telemetry.simulation.simulator.run import SimOptions, Simulator, flying
 from telemetry.topics.link_ways import WayStatus
 from telemetry.topics.messages import RawFrame
 from telemetry.topics.requests import Adopt, Arm, Connect, Disarm, Disconnect, Pause, Resume, SetSigning, StartAuto
-from telemetry.traffic.picture import EVERY_S
+from telemetry.traffic.traffic_picture import EVERY_S
 from tests.telemetry.link_bench import ME, Console, console, until
 from tests.telemetry.own_time import run
 from tests.telemetry.test_mavlink_flights import ALT_M, LAT_DEG, LON_DEG, items, phase, start, upload

@@ -10,7 +10,7 @@ from mapping.geometry.frames import moved_deg
 from telemetry.topics.obstacles import ObstacleAlert
 from telemetry.topics.traffic import TrafficSettings, TrafficStatus
 from telemetry.traffic.joining import PICTURES
-from telemetry.traffic.picture import TrafficPicture
+from telemetry.traffic.traffic_picture import TrafficPicture
 from tests.telemetry.traffic_messages import HERE, MAC, adsb, basic_id, location, own_state
 
 NEAR = TrafficSettings(warn_distance_m=1_000.0, warn_height_m=200.0, look_ahead_s=1.0)

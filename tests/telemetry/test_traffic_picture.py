@@ -14,7 +14,7 @@ from mapping.geometry.frames import moved_deg
 from telemetry.topics.obstacles import ObstacleAlert
 from telemetry.topics.traffic import GONE_S, Aircraft, TrafficSettings, TrafficStatus
 from telemetry.traffic.memory import MOST
-from telemetry.traffic.picture import MOST_TOLD, TrafficPicture
+from telemetry.traffic.traffic_picture import MOST_TOLD, TrafficPicture
 from telemetry.traffic.warning import CLEAR_S
 from tests.telemetry.traffic_messages import (
     ALL_VALID,

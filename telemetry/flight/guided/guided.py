@@ -21,7 +21,7 @@ from telemetry.flight.guided.leading import Leading
 from telemetry.flight.guided.orders import GuidedOrders, Place
 from telemetry.flight.guided.pending_command import PendingCommand, Then
 from telemetry.flight.guided.script_watches import HomeWatched, ModeWatch, Punctuality, Standstill
-from telemetry.flight.guided.whereabouts import Whereabouts
+from telemetry.flight.guided.vehicle_and_home import Whereabouts
 from telemetry.mavlink.actions import Action, Done, Failed, Message, Progress, Send
 from telemetry.mavlink.conversation import GROUND_STATION, Endpoints
 from telemetry.topics.messages import FlightPhase, FlightStatus, GuidedTarget
