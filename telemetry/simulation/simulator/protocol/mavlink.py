@@ -110,7 +110,7 @@ class Endpoint:
 
     def disconnect(self, peer: Hashable) -> None:
         self._peers.pop(peer, None)
-        self._parameters.forget(peer)
+        self._parameters.list.forget(peer)
         self._logs.forget(peer)
         self._files.forget(peer)
 
@@ -138,7 +138,7 @@ class Endpoint:
     def on_slice(self, wall_s: float) -> list[Reply]:
         """What is due after a slice of simulated time, of at most 20 ms if streams are to keep their rates."""
         self._own_logs.on_slice()
-        out = self._missions.on_tick(wall_s) + self._parameters.on_tick(wall_s) + self._logs.on_tick(wall_s)
+        out = self._missions.on_tick(wall_s) + self._parameters.list.on_tick(wall_s) + self._logs.on_tick(wall_s)
         out += self._files.on_tick(wall_s)
         out += [reply for due_s, reply in self._news if due_s <= wall_s]
         self._news = [(due_s, reply) for due_s, reply in self._news if due_s > wall_s]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
@@ -26,35 +26,17 @@ HASH = "_HASH_CHECK"
 """PX4 answers to it, although it is no parameter."""
 
 
-class ParameterProtocol:
-    """Says nothing about parameters that it does not have."""
+class ParameterList:
+    """The whole list, streamed to each peer that asked for it; ``value`` of a name and its index."""
 
-    def __init__(self, parameters: Parameters) -> None:
-        self._parameters = parameters
-        self._names = list(parameters)
+    def __init__(self, names: list[str], value: Callable[[str, int], Any]) -> None:
+        self._names, self._value = names, value
         self._listing: dict[Hashable, int] = {}
-        """How far the list has come, by the peer that asked for it."""
+        """How far it has come, by the peer that asked for it."""
         self._listed_s = 0.0
 
-    def on_message(self, message: Any, peer: Hashable) -> list[Reply]:
-        """Answers to the one that asked."""
-        kind = message.get_type()
-        if kind == "PARAM_REQUEST_LIST":
-            self._listing[peer] = 0
-            return []
-        if kind != "PARAM_REQUEST_READ":
-            return []
-        index = message.param_index
-        if index < 0:
-            return [(peer, self._value(message.param_id, UNNUMBERED))] if message.param_id in self._parameters else []
-        return [(peer, self._value(self._names[index], index))] if index < len(self._names) else []
-
-    def on_set(self, message: Any) -> list[Any]:
-        """What everybody hears of it: the value that is kept. A value that is no number is not answered."""
-        if message.param_id not in self._parameters or not math.isfinite(message.param_value):
-            return []
-        self._parameters.set(message.param_id, message.param_value)
-        return [self._value(message.param_id, UNNUMBERED)]
+    def begin(self, peer: Hashable) -> None:
+        self._listing[peer] = 0
 
     def on_tick(self, wall_s: float) -> list[Reply]:
         """The next values of the lists that were asked for."""
@@ -72,6 +54,35 @@ class ParameterProtocol:
 
     def forget(self, peer: Hashable) -> None:
         self._listing.pop(peer, None)
+
+
+class ParameterProtocol:
+    """Says nothing about parameters that it does not have."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._parameters = parameters
+        self._names = list(parameters)
+        self.list = ParameterList(self._names, self._value)
+
+    def on_message(self, message: Any, peer: Hashable) -> list[Reply]:
+        """Answers to the one that asked."""
+        kind = message.get_type()
+        if kind == "PARAM_REQUEST_LIST":
+            self.list.begin(peer)
+            return []
+        if kind != "PARAM_REQUEST_READ":
+            return []
+        index = message.param_index
+        if index < 0:
+            return [(peer, self._value(message.param_id, UNNUMBERED))] if message.param_id in self._parameters else []
+        return [(peer, self._value(self._names[index], index))] if index < len(self._names) else []
+
+    def on_set(self, message: Any) -> list[Any]:
+        """What everybody hears of it: the value that is kept. A value that is no number is not answered."""
+        if message.param_id not in self._parameters or not math.isfinite(message.param_value):
+            return []
+        self._parameters.set(message.param_id, message.param_value)
+        return [self._value(message.param_id, UNNUMBERED)]
 
     def _value(self, name: str, index: int) -> Any:
         return wire.MAVLink_param_value_message(

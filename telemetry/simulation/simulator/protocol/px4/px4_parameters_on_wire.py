@@ -11,10 +11,8 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
 from telemetry.simulation.simulator.protocol.item_protocol import Reply
+from telemetry.simulation.simulator.protocol.parameter_protocol import HASH, UNNUMBERED, ParameterList
 
-HASH = "_HASH_CHECK"
-UNNUMBERED = 65535
-LIST_EVERY_S, LIST_SHARE = 0.02, 40
 UINT32, INT32, FLOAT = wire.MAV_PARAM_TYPE_UINT32, wire.MAV_PARAM_TYPE_INT32, wire.MAV_PARAM_TYPE_REAL32
 
 
@@ -22,14 +20,13 @@ class Px4ParametersOnWire:
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
         self._names = list(parameters)
-        self._listing: dict[Hashable, int] = {}
-        self._listed_s = 0.0
+        self.list = ParameterList(self._names, lambda name, _: self._value(name))
 
     def on_message(self, message: Any, peer: Hashable) -> list[Reply]:
         """Answers to the one that asked; nothing about parameters that it does not have."""
         kind = message.get_type()
         if kind == "PARAM_REQUEST_LIST":
-            self._listing[peer] = 0
+            self.list.begin(peer)
             return [(peer, self._hash())]
         if kind != "PARAM_REQUEST_READ":
             return []
@@ -50,23 +47,6 @@ class Px4ParametersOnWire:
             value = float(struct.unpack("<i", struct.pack("<f", value))[0])
         self._parameters.set(name, value)
         return [self._value(name)]
-
-    def on_tick(self, wall_s: float) -> list[Reply]:
-        """The next values of the lists that were asked for."""
-        if not self._listing or wall_s - self._listed_s < LIST_EVERY_S:
-            return []
-        self._listed_s = wall_s
-        out: list[Reply] = []
-        for peer, begin in tuple(self._listing.items()):
-            end = begin + LIST_SHARE
-            out += [(peer, self._value(name)) for name in self._names[begin:end]]
-            self._listing[peer] = end
-            if end >= len(self._names):
-                del self._listing[peer]
-        return out
-
-    def forget(self, peer: Hashable) -> None:
-        self._listing.pop(peer, None)
 
     def _type(self, name: str) -> int:
         return FLOAT if self._parameters.specs[name].kind == "float" else INT32
