@@ -14,6 +14,7 @@ from telemetry.simulation.simulator.own_logs.keeping import MakeWriter
 from telemetry.simulation.simulator.protocol.command_protocol import ReceivedOrder
 from telemetry.simulation.simulator.protocol.item_protocol import Reply
 from telemetry.simulation.simulator.protocol.made_files import MadeFile
+from telemetry.simulation.simulator.protocol.parameter_protocol import ParameterList
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 
 
@@ -27,8 +28,8 @@ class Missions(Protocol):
 class ParametersOnWire(Protocol):
     def on_message(self, message: Any, peer: Hashable) -> list[Reply]: ...
     def on_set(self, message: Any) -> list[Any]: ...
-    def on_tick(self, wall_s: float) -> list[Reply]: ...
-    def forget(self, peer: Hashable) -> None: ...
+    @property
+    def list(self) -> ParameterList: ...
 
 
 class StreamsOnWire(Protocol):
