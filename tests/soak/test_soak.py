@@ -42,6 +42,12 @@ def test_a_fault_that_is_told_and_mended_breaks_nothing() -> None:
     assert broken(flown(NODES, LOST, avoidance(101.0, "watching"), avoidance(116.0, "watching"))) == []
 
 
+def test_what_the_next_link_says_before_it_is_seen_to_run_is_no_wrong_word() -> None:
+    back = told(108.0, "nodes", nodes=[{"name": "link", "state": "running"}])
+    assert broken(flown(NODES, LOST, avoidance(107.9, "watching"), back)) == []
+    assert broken(flown(NODES, LOST, avoidance(106.0, "watching"), back)) != []
+
+
 @pytest.mark.parametrize(("flight", "words"), [
     (flown(LOST), "no page was told that the link node does not work"),
     (flown(NODES), "avoidance is lost"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 from telemetry.bus.liveness import HUNG_S
@@ -11,6 +12,8 @@ from tests.soak.flight import BACK_S, Flown
 LATE_S = 1.5
 """A page reads what was said before a fault a little after it."""
 LINK_LOST_S = HUNG_S + LATE_S
+JUST_BACK_S = 1.0
+"""What the next one says may be told sooner than that it runs, and both sooner than it is seen here."""
 
 
 def broken(flown: Flown) -> list[str]:
@@ -70,16 +73,27 @@ def _wrong_words(flown: Flown, done: Done) -> Iterator[str]:
     fault, page = done.fault, flown.page
     if fault.who != "link" or fault.how not in ("stop", "kill"):
         return
-    silent_s = done.at_s + LINK_LOST_S
+    silent_s, until_s = done.at_s + LINK_LOST_S, min(done.back_s, _told_back_s(flown, done)) - JUST_BACK_S
     watching = [
         told
-        for told in page.since(silent_s, "obstacles", done.back_s)
+        for told in page.since(silent_s, "obstacles", until_s)
         if told.message["source"] == "live" and told.message["obstacles"]["avoidance"]["state"] == "watching"
     ]
-    live = [told for told in page.since(silent_s, "link", done.back_s) if told.message["link"]["state"] == "live"]
+    live = [told for told in page.since(silent_s, "link", until_s) if told.message["link"]["state"] == "live"]
     for what, found in (('avoidance was "watching"', watching), ('the link was "live"', live)):
         if found:
             yield f"{fault}: {what} {found[-1].t_mono_s - done.at_s:.1f} s after it."
+
+
+def _told_back_s(flown: Flown, done: Done) -> float:
+    """When a page was told that the node runs again."""
+    was_told_of = False
+    for told in flown.page.since(done.at_s, "nodes"):
+        state = next((n["state"] for n in told.message["nodes"] if n["name"] == done.fault.who), "running")
+        if was_told_of and state == "running":
+            return told.t_mono_s
+        was_told_of |= state != "running"
+    return math.inf
 
 
 def _afterwards(flown: Flown) -> Iterator[str]:
