@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import os
 import signal
 import sys
@@ -11,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from planning.terrain.rasters.confinement import plain_environment
+from telemetry.bus import spare_node
 from telemetry.bus.node_lock import NodeFacts, running_node
 
 LOG_BYTES = 2_000_000
@@ -32,23 +34,8 @@ class NodeProcess:
 
     @classmethod
     def start(cls, runtime_dir: Path, name: str, package: str, arguments: Sequence[str]) -> NodeProcess:
-        """Its output goes to ``<name>.log``: a pipe would end the node together with the server."""
-        log = runtime_dir / f"{name}.log"
-        bound_log(log)
-        flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW
-        pid = os.posix_spawn(
-            sys.executable,
-            [sys.executable, "-m", f"{package}.{name}", *arguments],
-            plain_environment(),
-            file_actions=[
-                (os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0),
-                (os.POSIX_SPAWN_OPEN, 1, str(log), flags, 0o600),
-                (os.POSIX_SPAWN_DUP2, 1, 2),
-                *((os.POSIX_SPAWN_CLOSE, handle) for handle in _inheritable()),
-            ],
-            setsid=True,
-        )
-        return cls(runtime_dir, name, pid, child=True)
+        command = [f"{package}.{name}", *arguments]
+        return cls(runtime_dir, name, _spawn(runtime_dir, name, command), child=True)
 
     @classmethod
     def adopt(cls, runtime_dir: Path, facts: NodeFacts) -> NodeProcess:
@@ -97,6 +84,60 @@ class NodeProcess:
             return False
         self.code = os.waitstatus_to_exitcode(status)
         return True
+
+
+class SpareNode:
+    """One that has loaded all that it needs and waits to take the place of one that dies: loading takes a second, and
+    several where the machine is busy. It ends with the server."""
+
+    def __init__(self, runtime_dir: Path, name: str, package: str) -> None:
+        waits, self._tells = os.pipe()
+        try:
+            command = [spare_node.__name__, f"{package}.{name}"]
+            pid = _spawn(runtime_dir, name, command, stdin=waits)
+        except BaseException:
+            os.close(self._tells)
+            raise
+        finally:
+            os.close(waits)
+        self.process = NodeProcess(runtime_dir, name, pid, child=True)
+
+    def take(self, arguments: Sequence[str]) -> NodeProcess | None:
+        """The process, which runs now. None where it has ended."""
+        try:
+            if self.process.has_ended():
+                return None
+            os.write(self._tells, json.dumps(list(arguments)).encode() + b"\n")
+        except BrokenPipeError:
+            return None
+        finally:
+            os.close(self._tells)
+        return self.process
+
+    def end(self) -> None:
+        """Of one that has not been taken."""
+        os.close(self._tells)
+        self.process.kill()
+
+
+def _spawn(runtime_dir: Path, name: str, command: Sequence[str], *, stdin: int | None = None) -> int:
+    """Its output goes to ``<name>.log``: a pipe would end the node together with the server."""
+    log = runtime_dir / f"{name}.log"
+    bound_log(log)
+    flags = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW
+    nothing = (os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0)
+    return os.posix_spawn(
+        sys.executable,
+        [sys.executable, "-m", *command],
+        plain_environment(),
+        file_actions=[
+            nothing if stdin is None else (os.POSIX_SPAWN_DUP2, stdin, 0),
+            (os.POSIX_SPAWN_OPEN, 1, str(log), flags, 0o600),
+            (os.POSIX_SPAWN_DUP2, 1, 2),
+            *((os.POSIX_SPAWN_CLOSE, handle) for handle in _inheritable()),
+        ],
+        setsid=True,
+    )
 
 
 def bound_log(log: Path) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from planning import __version__
-from server.work.node_process import NodeProcess, bound_log
+from server.work.node_process import NodeProcess, SpareNode, bound_log
 from telemetry import nodes
 from telemetry.bus.liveness import HUNG_S, STARVED_S, Liveness, Silence
 from telemetry.bus.node_lock import NodeFacts, running_node, running_nodes, silence_counts
@@ -23,6 +23,10 @@ _PAUSES_S = (0.0, 0.2, 0.5, 1.0, 2.0, 5.0)
 _STEADY_S = _PAUSES_S[-1]
 """A node that has run so long is started again at once: not more often than one that fails all the time."""
 _LOOK_EVERY_S = 0.1
+SPARED = frozenset({"link"})
+"""Without it nothing avoids obstacles: beside one that runs steadily a spare one waits."""
+_TAKES_OVER_S, _SPARE_AGAIN_S = 2.0, 30.0
+"""Until a spare one, which is loaded, has taken over; until the next one is loaded after one that failed."""
 
 
 State = Literal["starting", "running", "silent", "restarting", "stopped"]
@@ -47,6 +51,8 @@ class _Node:
         self.arguments = tuple(arguments)
         self.state = NodeState(name, "starting")
         self.process: NodeProcess | None = None
+        self.spare: SpareNode | None = None
+        self.spare_again_s = 0.0
         self.keeping: asyncio.Task[None] | None = None
         self.failures = 0
         self.last_end = ""
@@ -85,6 +91,8 @@ class Supervisor:
                 await asyncio.Event().wait()
         finally:
             self._group = None
+            for node in self._nodes.values():
+                _end_spare(node)
 
     async def start(self, name: str, arguments: Sequence[str]) -> None:
         """Wants the node running with these arguments. Does not wait for it: a call over the bus does.
@@ -110,6 +118,8 @@ class Supervisor:
                 node.keeping.cancel()
                 await asyncio.wait([node.keeping])
                 node.keeping = None
+            if (spare := _end_spare(node)) is not None:
+                await spare.process.ended()
             if node.process is not None:
                 await node.process.end()
             self._tell(node, "stopped", "", restarts=0)
@@ -120,7 +130,7 @@ class Supervisor:
 
     async def _keep_running(self, node: _Node) -> None:
         while True:
-            node.process = await self._found(node) or self._started(node)
+            node.process = await self._found(node) or await self._spare(node) or self._started(node)
             if node.process is None or not await self._watch(node, node.process):
                 await self._pause(node)
 
@@ -134,6 +144,33 @@ class Supervisor:
         log.info(text)
         self._tell(node, "running", text)
         return NodeProcess.adopt(self._runtime_dir, facts)
+
+    async def _spare(self, node: _Node) -> NodeProcess | None:
+        """The one that waited, now that it has taken over. None where there is none, or it does not do so."""
+        spare, node.spare = node.spare, None
+        process = None if spare is None else spare.take(self._all_arguments(node.arguments))
+        if process is None:
+            return None
+        until_s = time.monotonic() + _TAKES_OVER_S
+        while not process.has_ended() and time.monotonic() < until_s:
+            if process.facts():
+                return process
+            await asyncio.sleep(_LOOK_EVERY_S / 5)
+        log.error("The spare %s node did not take over.", node.name)
+        process.kill()
+        await process.ended()
+        return None
+
+    def _keep_spare(self, node: _Node) -> None:
+        if node.spare is not None and node.spare.process.has_ended():
+            _end_spare(node)
+            node.spare_again_s = time.monotonic() + _SPARE_AGAIN_S
+        if node.spare is None and time.monotonic() > node.spare_again_s:
+            try:
+                node.spare = SpareNode(self._runtime_dir, node.name, self._package)
+            except OSError:
+                log.exception("A spare %s node cannot be started.", node.name)
+                node.spare_again_s = time.monotonic() + _SPARE_AGAIN_S
 
     def _started(self, node: _Node) -> NodeProcess | None:
         try:
@@ -164,6 +201,8 @@ class Supervisor:
                     return True
             if asyncio.get_running_loop().time() - since_s > _STEADY_S:
                 node.failures = 0
+                if node.name in SPARED:
+                    self._keep_spare(node)
             bound_log(self._runtime_dir / f"{node.name}.log")
             await asyncio.sleep(_LOOK_EVERY_S)
         code = "" if process.code is None else f" (code {process.code})"
@@ -204,6 +243,13 @@ class Supervisor:
         if after != node.state or state == "starting":
             node.state = after
             self._changed(self.states)
+
+
+def _end_spare(node: _Node) -> SpareNode | None:
+    spare, node.spare = node.spare, None
+    if spare is not None:
+        spare.end()
+    return spare
 
 
 def _kept(facts: NodeFacts) -> str:

@@ -29,7 +29,7 @@ import asyncio, signal, sys
 from pathlib import Path
 from telemetry.bus.node import run_node
 
-async def main(bus, context):
+async def work(bus, context):
     if "--fail" in sys.argv:
         raise KeyError("inside")
     if "--free" in sys.argv:
@@ -49,7 +49,11 @@ async def main(bus, context):
     while context.is_needed():
         await asyncio.sleep(0.1)
 
-sys.exit(run_node(Path(__file__).stem, Path(sys.argv[2]), main))
+def main():
+    return run_node(Path(__file__).stem, Path(sys.argv[2]), work)
+
+if __name__ == "__main__":
+    sys.exit(main())
 """
 
 
