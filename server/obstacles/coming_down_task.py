@@ -16,6 +16,7 @@ from server.obstacles.rest_of_plan import Underway, rest_of_plan
 from server.scene.mirror import Voxels
 from server.schemas import PlanDoc, PoiDoc
 from server.work.jobs import Progress
+from telemetry.flight.avoidance.coming_down import between
 from telemetry.flight.home_watch import HomePlace
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.vehicle import VehicleState
@@ -166,14 +167,4 @@ def _pieces(before: GuidedTarget | None, target: GuidedTarget) -> list[GuidedTar
     apart = LocalFrame(before.lat_deg, before.lon_deg, 0.0).to_enu(target.lat_deg, target.lon_deg, 0.0)[0, :2]
     count = max(1, math.ceil(float(np.linalg.norm(apart)) / PIECE_M))
     shares = [k / count for k in range(1, count)]
-    return [*(_between(before, target, share) for share in shares), target]
-
-
-def _between(a: GuidedTarget, b: GuidedTarget, share: float) -> GuidedTarget:
-    return replace(
-        b,
-        lat_deg=a.lat_deg + share * (b.lat_deg - a.lat_deg),
-        lon_deg=a.lon_deg + share * (b.lon_deg - a.lon_deg),
-        alt_rel_home_m=a.alt_rel_home_m + share * (b.alt_rel_home_m - a.alt_rel_home_m),
-        loiter_s=0.0,
-    )
+    return [*(between(before, target, share) for share in shares), target]

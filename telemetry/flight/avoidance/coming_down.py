@@ -33,16 +33,20 @@ def joined(targets: tuple[GuidedTarget, ...], state: VehicleState, braking: Brak
     leg, share = _at(places, along_m + braking.distance_m(state.ground_speed_m_s or 0.0))
     if leg is None:
         raise NotAllowedError("The line that was planned is almost flown.", advice="It stays higher.")
-    a, b = targets[leg], targets[leg + 1]
-    low = replace(
+    low = between(targets[leg], targets[leg + 1], share)
+    over = replace(low, alt_rel_home_m=max(alt_m, low.alt_rel_home_m))
+    return (over, low, *targets[leg + 1 :])
+
+
+def between(a: GuidedTarget, b: GuidedTarget, share: float) -> GuidedTarget:
+    """A place on the line from ``a`` to ``b``, flown to as ``b`` is; nothing is waited for there."""
+    return replace(
         b,
         lat_deg=a.lat_deg + share * (b.lat_deg - a.lat_deg),
         lon_deg=a.lon_deg + share * (b.lon_deg - a.lon_deg),
         alt_rel_home_m=a.alt_rel_home_m + share * (b.alt_rel_home_m - a.alt_rel_home_m),
         loiter_s=0.0,
     )
-    over = replace(low, alt_rel_home_m=max(alt_m, low.alt_rel_home_m))
-    return (over, low, *targets[leg + 1 :])
 
 
 def _nearest(places: list[tuple[float, float]]) -> tuple[float, float]:

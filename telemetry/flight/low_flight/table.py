@@ -29,6 +29,15 @@ class Action:
     """A bit mask, and its bit that makes a mission go on all the same."""
 
 
+_PX4_ON_LOSS: dict[int, tuple[State, str]] = {
+    1: ("look", "holds its place until the battery is low"),
+    2: ("good", RETURN),
+    3: ("bad", LAND),
+    5: ("bad", "ends the flight: it falls"),
+    6: ("bad", "stops its motors in the air"),
+}
+"""Of NAV_DLL_ACT and NAV_RCL_ACT."""
+
 ACTIONS: dict[Firmware, tuple[Action, ...]] = {
     "ardupilot": (
         Action(
@@ -127,11 +136,7 @@ ACTIONS: dict[Firmware, tuple[Action, ...]] = {
             "When this station is not heard any more, the vehicle",
             {
                 0: ("bad", f"{NOTHING} without anybody who sees it"),
-                1: ("look", "holds its place until the battery is low"),
-                2: ("good", RETURN),
-                3: ("bad", LAND),
-                5: ("bad", "ends the flight: it falls"),
-                6: ("bad", "stops its motors in the air"),
+                **_PX4_ON_LOSS,
             },
             2,
             ("COM_DLL_EXCEPT", 0),
@@ -141,11 +146,7 @@ ACTIONS: dict[Firmware, tuple[Action, ...]] = {
             "When the transmitter is not heard any more, the vehicle",
             {
                 0: ("look", NOTHING),
-                1: ("look", "holds its place until the battery is low"),
-                2: ("good", RETURN),
-                3: ("bad", LAND),
-                5: ("bad", "ends the flight: it falls"),
-                6: ("bad", "stops its motors in the air"),
+                **_PX4_ON_LOSS,
             },
             2,
             ("COM_RCL_EXCEPT", 0),

@@ -53,6 +53,16 @@ def read_order(message: Any) -> ReceivedOrder:
     return ReceivedOrder(message.command, params, message.param5, message.param6, message.param7, 3)
 
 
+def asked_velocity(message: Any, heading_rad: float) -> Vec3 | None:
+    """North, east, up (m/s); frames of the body turn with the vehicle's nose. None: faster than anything flies."""
+    vx, vy, vz = message.vx, message.vy, message.vz
+    if not all(abs(value) < FASTEST_M_S for value in (vx, vy, vz)):
+        return None
+    turn = heading_rad if message.coordinate_frame in OF_THE_BODY else 0.0
+    c, s = math.cos(turn), math.sin(turn)
+    return vx * c - vy * s, vx * s + vy * c, -vz
+
+
 def whole(value: float) -> int:
     """A number that came as a float; ground stations write NaN for "not given"."""
     return int(value) if math.isfinite(value) else 0
@@ -103,7 +113,7 @@ class Commands:
     def position_target(self, message: Any) -> None:
         """SET_POSITION_TARGET_GLOBAL_INT or _LOCAL_NED: a place is flown to, a velocity flown, or both followed."""
         heading_rad = None if message.type_mask & NO_YAW else _heading(message.yaw)
-        velocity = None if message.type_mask & NO_VELOCITY else self._velocity(message)
+        velocity = None if message.type_mask & NO_VELOCITY else asked_velocity(message, self._pilot.heading_goal_rad)
         if message.type_mask & NO_POSITION:
             if velocity:
                 self._pilot.fly_at(velocity, heading_rad=heading_rad)
@@ -116,15 +126,6 @@ class Commands:
             self._pilot.follow(goal, velocity, heading_rad=heading_rad)
         elif goal and message.type_mask & NO_VELOCITY:
             self._pilot.go_to(goal, heading_rad=heading_rad)
-
-    def _velocity(self, message: Any) -> Vec3 | None:
-        """North, east, up; frames of the body turn with the vehicle's nose."""
-        vx, vy, vz = message.vx, message.vy, message.vz
-        if not all(abs(value) < FASTEST_M_S for value in (vx, vy, vz)):
-            return None
-        turn = self._pilot.heading_goal_rad if message.coordinate_frame in OF_THE_BODY else 0.0
-        c, s = math.cos(turn), math.sin(turn)
-        return vx * c - vy * s, vx * s + vy * c, -vz
 
     def _arm(self, order: ReceivedOrder) -> Answer:
         force = whole(order.params[1]) == FORCE

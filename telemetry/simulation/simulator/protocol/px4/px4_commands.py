@@ -12,14 +12,13 @@ from telemetry.simulation.simulator.autopilot.px4.px4_autopilot import Px4Pilot,
 from telemetry.simulation.simulator.neu_frame import Vec3
 from telemetry.simulation.simulator.protocol.command_protocol import (
     FARTHEST_M,
-    FASTEST_M_S,
     FORCE,
     NO_POSITION,
     NO_VELOCITY,
     NO_YAW,
-    OF_THE_BODY,
     WITHOUT_MOTION,
     ReceivedOrder,
+    asked_velocity,
     whole,
 )
 from telemetry.simulation.simulator.protocol.px4.px4_numbers import name_of
@@ -71,7 +70,7 @@ class Px4Commands:
         if not message.type_mask & NO_POSITION:
             place = self._place_of(message)
         elif not message.type_mask & NO_VELOCITY:
-            velocity = self._velocity(message)
+            velocity = asked_velocity(message, self._pilot.heading_goal_rad)
         if place is None and velocity is None:
             return
         self._pilot.offboard.hear(self._pilot.now_s, place, velocity)
@@ -137,14 +136,6 @@ class Px4Commands:
         frame = self._pilot.frame
         n, e, _ = frame.neu_from_geodetic(order.lat_deg, order.lon_deg, 0.0)
         return self._pilot.set_home((n, e, order.alt_m - frame.alt_amsl_m))
-
-    def _velocity(self, message: Any) -> Vec3 | None:
-        vx, vy, vz = message.vx, message.vy, message.vz
-        if not all(abs(value) < FASTEST_M_S for value in (vx, vy, vz)):
-            return None
-        turn = self._pilot.heading_goal_rad if message.coordinate_frame in OF_THE_BODY else 0.0
-        c, s = math.cos(turn), math.sin(turn)
-        return vx * c - vy * s, vx * s + vy * c, -vz
 
     def _place_of(self, message: Any) -> Vec3 | None:
         frame = self._pilot.frame
