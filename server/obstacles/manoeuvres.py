@@ -13,6 +13,7 @@ from mapping.geometry.frames import apart_m
 from server.errors import NotFoundError, reported
 from server.obstacles.manoeuvre_situation import Prepared, impossible
 from server.obstacles.manoeuvre_task import prepare
+from server.obstacles.sensed_flight import is_disarmed
 from server.obstacles.surroundings import Surroundings, are_maps_whole
 from server.scene.layers.region_layers import Route
 from server.schemas import ManoeuvreDoc
@@ -25,6 +26,7 @@ from telemetry.topics.requests import FlyManoeuvre, MayFlyManoeuvre, Operator
 log = logging.getLogger("hedgehop.obstacles")
 
 NOTHING_KNOWN = "The plan that is flown, its surface model, or home is not known here. Hold, or steer clear by sight."
+STANDS = "The vehicle stands on the ground: a way past it is flown in flight only."
 PARTS_MISSING = "Parts of a map are missing: look before you fly it."
 KINDS = ("obstacle", "conflict", "approach")
 AGAIN_AFTER_S = 1.0
@@ -134,6 +136,9 @@ class Manoeuvres:
                     continue
 
     async def _renew(self, standing: ObstacleAlert | None, moving: ObstacleAlert | None) -> None:
+        if is_disarmed(self._around.live.state):
+            self._show(_none(STANDS, standing, moving))
+            return
         try:
             situation = await self._around.situation(standing, moving, at_once=True)
             if self._watch.avoidance.state == "climbing":

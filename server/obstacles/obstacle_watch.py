@@ -11,6 +11,7 @@ from dataclasses import replace
 from server.errors import reported
 from server.heard.channel import Channel
 from server.obstacles.alert_list import LatchedAlerts
+from server.obstacles.sensed_flight import is_disarmed
 from server.scene.mirror import MapMirror
 from server.schemas import (
     AlertMessage,
@@ -114,6 +115,11 @@ class Watch:
             stays_higher=self.stays_higher,
         )
 
+    @property
+    def is_disarmed(self) -> bool:
+        """The vehicle stands: nothing that is meant for flight is to be said of it."""
+        return self._vehicle is not None and is_disarmed(self._vehicle.state)
+
     # What is heard
 
     def on_status(self, status: PerceptionStatus) -> None:
@@ -159,13 +165,16 @@ class Watch:
         text = _NOBODY_WATCHES.get(self.avoidance.state)
         if (blind := self._blind) is not None and blind.text != text:
             over = "is off" if not self.avoidance.enabled else "does not watch" if text else "sees again"
-            self._blind = None
-            self._tell_own(replace(blind, phase="ends", text=f"Avoidance {over}."))
+            self._end_blindness(blind, f"Avoidance {over}.")
         if self._blind is None and text and self._vehicle is not None and self._vehicle.in_air:
             sensor: Sensor = before.sensors[0] if before.sensors else "radar"
             now_s = self._now_mono_s()
             self._blind = ObstacleAlert(f"blind-{now_s:.1f}", sensor, "avoidance", "begins", now_s, 0.0, now_s, text)
             self._tell_own(self._blind)
+
+    def _end_blindness(self, blind: ObstacleAlert, text: str) -> None:
+        self._blind = None
+        self._tell_own(replace(blind, phase="ends", text=text))
 
     def on_settings(self, settings: PerceptionSettings) -> None:
         self.settings = settings
@@ -179,6 +188,8 @@ class Watch:
             await asyncio.to_thread(mirror.on_flight, flies=flies)
         if not flies:
             self._ask_for_all()
+            if self._blind is not None:
+                self._end_blindness(self._blind, "The flight is over.")
         self._tell_kept()
 
     async def dismiss(self, clear_count: int) -> None:

@@ -6,6 +6,11 @@ from telemetry.mavlink.believing import is_in_the_air
 from telemetry.topics.vehicle import VehicleState
 
 
+def is_disarmed(state: VehicleState | None) -> bool:
+    """By its own word: who has said nothing may fly."""
+    return state is not None and state.heartbeat_t_mono_s is not None and not state.armed
+
+
 class SensedFlight:
     """From when a vehicle is in the air until it is disarmed, or another one is heard.
 

@@ -30,6 +30,8 @@ SAME_M = 1.5
 COMES_WITHIN_S, LOOK_S = 10.0, 0.02
 """The largest map that is told comes in eight seconds."""
 _UNKNOWN = "what stands in the way is not known"
+_ASKED = "They are asked for; ask again."
+_STARTED = "See that it is started again"
 _MEANWHILE = "Until then hold, or steer clear by sight."
 _EMPTY = "It counts again after the landing, or once you empty the maps."
 
@@ -71,8 +73,10 @@ def _missing(watch: Watch, sensor: Sensor, within_s: float) -> NotReadyError:
     what = f"Parts of the {sensor} map have been missing for {within_s:.0f} s"
     if watch.is_silent(sensor):
         what = f"{what}, and its node does not run: {_UNKNOWN}."
-        return NotReadyError(what, where=sensor, advice=f"See that it is started again. {_EMPTY} {_MEANWHILE}")
-    return NotReadyError(f"{what}: {_UNKNOWN}.", where=sensor, advice=f"They are asked for; ask again. {_MEANWHILE}")
+        advice = f"{_STARTED}, or empty the maps." if watch.is_disarmed else f"{_STARTED}. {_EMPTY} {_MEANWHILE}"
+        return NotReadyError(what, where=sensor, advice=advice)
+    advice = _ASKED if watch.is_disarmed else f"{_ASKED} {_MEANWHILE}"
+    return NotReadyError(f"{what}: {_UNKNOWN}.", where=sensor, advice=advice)
 
 
 def maps_revision(watch: Watch) -> tuple[int, ...]:

@@ -13,6 +13,7 @@ from planning.terrain.vertical_datum import is_amsl
 from telemetry.errors import NotAllowedError
 from telemetry.flight.home_watch import MOVED_M, HomePlace, home_of, is_there
 from telemetry.flight.preflight.preflight import LARGEST_SHIFT_M
+from telemetry.mavlink.believing import is_in_the_air
 from telemetry.topics.obstacles import MapOrigin
 from telemetry.topics.vehicle import VehicleState
 
@@ -61,7 +62,9 @@ def home_on_ground(origins: Sequence[MapOrigin], took_off: HomePlace | None, sta
         raise NotAllowedError(what, where="home", advice="Wait for it.")
     if not all(is_there(HomePlace(each.lat_deg, each.lon_deg, each.alt_amsl_m), now) for each in origins):
         what = "Things were seen under another home, and home of the take-off was not heard here: how high they stand"
-        raise NotAllowedError(f"{what} is not known.", where="home", advice="Steer clear by sight, and land.")
+        flies = state.armed and is_in_the_air(state)
+        advice = "Steer clear by sight, and land." if flies else "Plan without them, or empty the maps and look again."
+        raise NotAllowedError(f"{what} is not known.", where="home", advice=advice)
     return now
 
 
@@ -72,8 +75,8 @@ def up_zero_m(ground: SurfaceModel, home: HomePlace, origin: MapOrigin) -> float
     """
     ground_m = _ground_m(ground, home)
     if not math.isfinite(ground_m):
-        what = "The surface model knows no height where the vehicle took off: how high things stand is not known."
-        raise NotAllowedError(what, where="home", advice="Open the model that the flight began over.")
+        what = "The surface model knows no height at the home of the flight: how high things stand is not known."
+        raise NotAllowedError(what, where="home", advice="Open the model of the ground that it lies on.")
     return ground_m + origin.alt_amsl_m - home.alt_amsl_m
 
 

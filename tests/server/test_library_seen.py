@@ -71,8 +71,11 @@ def test_a_map_of_another_home_stands_as_high_as_by_that_of_the_take_off(terrain
     ]
     low_m, high_m = (float(each.elevation_at(MAST_XY)[0]) for each in tops)
     assert high_m - low_m == pytest.approx(4.0)
-    with pytest.raises(NotAllowedError, match="seen under another home"):
-        keep_seen(directory, [seen_map(dsm)], replace(state, home_alt_amsl_m=496.0), None, report=quiet)
+    for flies in (False, True):
+        moved = replace(state, home_alt_amsl_m=496.0, armed=flies, landed="in_air" if flies else "on_ground")
+        with pytest.raises(NotAllowedError, match="seen under another home") as refused:
+            keep_seen(directory, [seen_map(dsm)], moved, None, report=quiet)
+        assert ("land" in refused.value.advice, "empty the maps" in refused.value.advice) == (flies, not flies)
 
 
 def test_a_home_on_what_was_seen_is_refused(terrain: tuple[Dsm, Path]) -> None:

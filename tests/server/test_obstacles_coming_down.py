@@ -129,7 +129,7 @@ def test_how_high_things_stand_that_were_seen_under_another_home_is_refused_wher
     assert "seen under another home" in rest_of(replace(there, state=moved, took_off=None)).why
     with pytest.raises(NotAllowedError, match="does not tell its home"):
         burned(planned[0], there.maps, there.state, None)
-    with pytest.raises(NotAllowedError, match="no height where the vehicle took off"):
+    with pytest.raises(NotAllowedError, match="no height at the home"):
         burned(planned[0], there.maps, same, HomePlace(lat_deg + 1.0, lon_deg, 900.0))
     assert burned(planned[0], (), there.state, None) is planned[0]
 

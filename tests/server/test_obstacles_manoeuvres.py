@@ -162,6 +162,15 @@ def test_why_nothing_can_be_offered_is_told(what: Any, kind: str) -> None:
     assert desk.asked == []
 
 
+def test_of_a_vehicle_that_stands_disarmed_nothing_is_sought_and_no_flight_is_spoken_of() -> None:
+    desk = Desk()
+    desk.live.state = VehicleState(1, 1, heartbeat_t_mono_s=1.0)
+    desk.manoeuvres.on_alert(alert("a"))
+    asyncio.run(desk.until(lambda: desk.watch.state.manoeuvres))
+    assert {(doc.possible, doc.text) for doc in desk.watch.state.manoeuvres} == {(False, manoeuvres.STANDS)}
+    assert desk.asked == []
+
+
 def test_when_the_newest_is_over_the_one_before_counts() -> None:
     desk = Desk((prepared(),), (prepared(),))
     desk.manoeuvres.on_alert(alert("a"))

@@ -16,6 +16,7 @@ from server.obstacles.obstacle_watch import DEAD_S, LATE_S, Watch
 from server.obstacles.surroundings import are_maps_whole, seen_maps
 from telemetry.perception.map_changes import ChangeTeller
 from telemetry.topics.obstacles import AvoidanceStatus, FlightMapStatus
+from telemetry.topics.vehicle import VehicleState
 from tests.server.fakes import Told
 from tests.server.obstacle_messages import ORIGIN, alert, delta, status
 
@@ -62,6 +63,20 @@ def test_avoidance_that_loses_its_eyes_in_flight_is_alerted_at_once_until_it_see
     vehicle.in_air = False
     watch.on_avoidance(blind)
     assert len([message for message in told if message.type == "alert"]) == 2
+
+
+def test_a_vehicle_that_has_landed_is_not_told_to_steer_clear() -> None:
+    told = Told()
+    vehicle: Any = SimpleNamespace(in_air=True)
+    watch = Watch("live", told, vehicle, now_mono_s=Clock(), now_utc_s=lambda: 5000.0)
+    asyncio.run(watch.on_flight(flies=True))
+    watch.on_avoidance(AvoidanceStatus(enabled=True, state="blind"))
+    assert [doc.over for doc in watch.state.alerts if doc.alert.kind == "avoidance"] == [False]
+    vehicle.in_air = False
+    asyncio.run(watch.on_flight(flies=False))
+    watch.on_avoidance(AvoidanceStatus(enabled=True, state="blind"))
+    said = [message.alert for message in told if message.type == "alert" and message.alert.kind == "avoidance"]
+    assert [(alert.phase, alert.text) for alert in said[1:]] == [("ends", "The flight is over.")]
 
 
 def test_avoidance_is_gone_with_the_link_process_and_back_with_its_word() -> None:
@@ -285,6 +300,39 @@ def test_half_a_map_of_a_node_that_does_not_come_back_blocks_no_longer_than_the_
         assert not watch.needs_whole["radar"].is_set(), "nobody would answer"
         watch.on_status(status(voxels_occupied=3))
         assert watch.needs_whole["radar"].is_set()
+
+    asyncio.run(scenario())
+
+
+@pytest.mark.parametrize(
+    ("state", "in_flight"),
+    [
+        (VehicleState(1, 1, heartbeat_t_mono_s=1.0), False),
+        (VehicleState(1, 1, heartbeat_t_mono_s=1.0, armed=True, landed="in_air"), True),
+        (VehicleState(1, 1), True),  # it has not said whether it flies
+        (None, True),
+    ],
+)
+def test_only_of_a_vehicle_that_may_fly_it_is_said_to_hold_or_to_steer_clear(
+    state: VehicleState | None, *, in_flight: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scenario() -> None:
+        vehicle: Any = SimpleNamespace(state=state)
+        clock = Clock()
+        watch = Watch("live", Told(), vehicle, now_mono_s=clock)
+        monkeypatch.setattr("server.obstacles.surroundings.COMES_WITHIN_S", 0.0)
+        watch.on_status(status())
+        await watch.on_map(delta(CRANE, whole=True, parts=2))
+        with pytest.raises(NotReadyError) as refused:
+            await seen_maps(watch)
+        assert refused.value.advice.startswith("They are asked for; ask again.")
+        assert ("steer clear" in refused.value.advice) is in_flight
+        clock.now_s += DEAD_S + 0.1
+        with pytest.raises(NotReadyError) as refused:
+            await seen_maps(watch)
+        words = refused.value.advice
+        assert "empty the maps" in words
+        assert ("steer clear" in words, "landing" in words) == (in_flight, in_flight)
 
     asyncio.run(scenario())
 
