@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from planning.evading.way_past import Kind
     from telemetry.perception.mission_line import FlightLine
 
+PAST: tuple[Kind, ...] = ("over", "around")
+"""Ways past what stands."""
 _HANDLE = re.compile(r"[^A-Za-z0-9_.-]")
 
 
@@ -91,6 +93,12 @@ def handle_of(kind: str, alert: ObstacleAlert) -> str:
 def impossible(kind: Kind, why: str, alert: ObstacleAlert) -> Prepared:
     """``why``: for the pilot."""
     return Prepared(ManoeuvreDoc(id=handle_of(kind, alert), kind=kind, for_alert=alert.id, possible=False, text=why))
+
+
+def none_possible(why: str, standing: ObstacleAlert | None, moving: ObstacleAlert | None) -> tuple[Prepared, ...]:
+    """Each way that would be looked for, with the same reason: none goes without a word."""
+    past = () if standing is None else tuple(impossible(kind, why, standing) for kind in PAST)
+    return past if moving is None else (*past, impossible("sidestep", why, moving))
 
 
 def cruise_m_s(record: PlanRecord) -> float:

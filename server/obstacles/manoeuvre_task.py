@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
-from functools import lru_cache
+from collections.abc import Callable
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +16,16 @@ from mapping.geometry.frames import LocalFrame
 from planning.missions.vehicle_profile import parse_profile
 from server.library.documents import clearance_of
 from server.library.terrains import ground_notice
-from server.obstacles.manoeuvre_situation import MissionAhead, Prepared, Situation, cruise_m_s, handle_of, impossible
+from server.obstacles.manoeuvre_situation import (
+    PAST,
+    MissionAhead,
+    Prepared,
+    Situation,
+    cruise_m_s,
+    handle_of,
+    impossible,
+    none_possible,
+)
 from server.scene.mirror import Voxels
 from server.schemas import ManoeuvreDoc
 from server.work.jobs import Progress
@@ -24,13 +35,17 @@ from telemetry.topics.obstacles import GroundNotice, MapOrigin, ObstacleAlert
 if TYPE_CHECKING:
     from mapping.perceiving.ground import GroundGrid
     from planning.evading.keep_clear import Seen
-    from planning.evading.way_past import Manoeuvre, NoWay
+    from planning.evading.way_past import Kind, Manoeuvre, NoWay
     from telemetry.perception.mission_line import FlightLine
+
+log = logging.getLogger("hedgehop.obstacles")
 
 BESIDE_M = 3.0
 """A vehicle farther than this from where its leg begins is on its way to it."""
 NEAR_M = 250.0
 """Farther from the vehicle no way leads."""
+NO_PLACE = "Where the vehicle is now is not known."
+NO_LINE = "The mission on board is no line that could be gone on along. Hold, and fly past it by hand."
 NO_MISSION = "A guided way is flown, not the mission. Hold, then ask for another way."
 
 
@@ -43,7 +58,7 @@ def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
     report("Looking for a way past the obstacle", None)
     line, state = mission_line(situation.record, situation.origin), situation.state
     if state.lat_deg is None or state.lon_deg is None or state.alt_rel_home_m is None:
-        return ()
+        return none_possible(NO_PLACE, situation.alert, situation.approach)
     frame = LocalFrame(situation.origin.lat_deg, situation.origin.lon_deg, situation.origin.alt_amsl_m)
     position = frame.to_enu(state.lat_deg, state.lon_deg, situation.origin.alt_amsl_m + state.alt_rel_home_m)[0]
     flies_way = _flies_way(situation.flight)
@@ -56,17 +71,27 @@ def prepare(situation: Situation, *, report: Progress) -> tuple[Prepared, ...]:
         required_m=required_m(situation.record),
         ceiling_m=max(0.0, situation.ceiling_m - situation.height_offset_m),
     )
-    prepared: list[Prepared] = []
-    if (alert := situation.alert) is not None and ahead is not None:
-        ways = [find(position, ahead.points_enu_m, seen, surface, params) for find in (over, around)]
-        prepared += [_prepared(way, alert, situation, ahead, frame) for way in ways]
-    if situation.alert is not None and flies_way:
-        prepared += [impossible(kind, NO_MISSION, situation.alert) for kind in ("over", "around")]
-    if situation.approach is not None:
-        prepared.append(
-            sidestepped(situation, situation.approach, position, ahead, Around(seen, surface, params, frame))
-        )
+    alert, approach, prepared = situation.alert, situation.approach, list[Prepared]()
+    if alert is not None and ahead is None:
+        prepared += none_possible(NO_MISSION if flies_way else NO_LINE, alert, None)
+    elif alert is not None and ahead is not None:
+        for kind, find in zip(PAST, (over, around), strict=True):
+            way = partial(find, position, ahead.points_enu_m, seen, surface, params)
+            prepared.append(_or_why(kind, alert, lambda way=way: _prepared(way(), alert, situation, ahead, frame)))
+    if approach is not None:
+        there = Around(seen, surface, params, frame)
+        prepared.append(_or_why("sidestep", approach, lambda: sidestepped(situation, approach, position, ahead, there)))
     return tuple(prepared)
+
+
+def _or_why(kind: Kind, alert: ObstacleAlert, find: Callable[[], Prepared]) -> Prepared:
+    """One that fails takes none of the others with it, and says so."""
+    try:
+        return find()
+    except Exception as error:
+        from server.errors import reported
+
+        return impossible(kind, reported(error, log, f"Looking for the way: {kind}").what, alert)
 
 
 def _flies_way(flight: FlightStatus) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 
 from mapping.geometry.frames import apart_m
 from server.errors import NotFoundError, reported
-from server.obstacles.manoeuvre_situation import Prepared, impossible
+from server.obstacles.manoeuvre_situation import Prepared, none_possible
 from server.obstacles.manoeuvre_task import prepare
 from server.obstacles.sensed_flight import is_disarmed
 from server.obstacles.surroundings import Surroundings, are_maps_whole
@@ -137,7 +137,7 @@ class Manoeuvres:
 
     async def _renew(self, standing: ObstacleAlert | None, moving: ObstacleAlert | None) -> None:
         if is_disarmed(self._around.live.state):
-            self._show(_none(STANDS, standing, moving))
+            self._show(none_possible(STANDS, standing, moving))
             return
         try:
             situation = await self._around.situation(standing, moving, at_once=True)
@@ -145,7 +145,7 @@ class Manoeuvres:
                 self._show(())  # those on show begin where the vehicle is no more
                 return
             if situation is None:
-                self._show(_none(NOTHING_KNOWN, standing, moving))
+                self._show(none_possible(NOTHING_KNOWN, standing, moving))
                 return
             self._busy("" if self.prepared else "Looking for a way past the obstacle")
             prepared = tuple([await self._allowed(each) for each in await self._lane.call(prepare, situation)])
@@ -154,7 +154,7 @@ class Manoeuvres:
         except Exception as error:
             doc = reported(error, log, "Preparing a manoeuvre")
             log.warning("No manoeuvre: %s", doc.what)
-            prepared = _none(doc.what, standing, moving)
+            prepared = none_possible(doc.what, standing, moving)
         self._watch.busy = ""
         # Another alert, or none, while the worker was at it: what it found is void.
         served = self._standing is standing and self._moving is moving
@@ -190,13 +190,6 @@ def _over_parts(found: Prepared) -> Prepared:
     if not found.doc.possible:
         return found
     return replace(found, doc=found.doc.model_copy(update={"text": f"{found.doc.text} {PARTS_MISSING}"}))
-
-
-def _none(why: str, standing: ObstacleAlert | None, moving: ObstacleAlert | None) -> tuple[Prepared, ...]:
-    """Why there is no way."""
-    if standing is not None:
-        return (impossible("over", why, standing),)
-    return () if moving is None else (impossible("sidestep", why, moving),)
 
 
 def _turned_rad(shown: Prepared, now: Prepared) -> float:

@@ -19,7 +19,7 @@ from planning.planner.request import PlanRequest
 from planning.terrain.dsm import Dsm
 from server.library.terrains import store_terrain
 from server.obstacles.manoeuvre_situation import Situation
-from server.obstacles.manoeuvre_task import prepare, required_m
+from server.obstacles.manoeuvre_task import NO_LINE, NO_PLACE, prepare, required_m
 from server.scene.mirror import MapMirror
 from server.schemas.plan_docs import ClearanceDoc, PlanDoc
 from telemetry.perception.mission_line import mission_line
@@ -150,10 +150,29 @@ def test_a_mission_that_nothing_blocks_needs_no_manoeuvre(planned: tuple[Dsm, Pl
     assert all("keeps" in way.doc.text for way in ways)
 
 
-def test_without_a_position_there_is_none(planned: tuple[Dsm, PlanRecord, Path]) -> None:
-    here = situation(planned, 4)
-    lost = replace(here, state=replace(here.state, lat_deg=None))
-    assert prepare(lost, report=lambda step, share: None) == ()
+def test_without_a_position_or_a_line_each_way_says_why_not(planned: tuple[Dsm, PlanRecord, Path]) -> None:
+    both = replace(situation(planned, 4), approach=approach(), tracks=None)
+    lost = prepare(replace(both, state=replace(both.state, lat_deg=None)), report=lambda *_: None)
+    assert [way.doc.kind for way in lost] == ["over", "around", "sidestep"]
+    assert {way.doc.text for way in lost} == {NO_PLACE}
+    pointless = prepare(replace(both, record=replace(both.record, mission_wpl="none")), report=lambda *_: None)
+    assert [(way.doc.kind, way.doc.text) for way in pointless[:2]] == [("over", NO_LINE), ("around", NO_LINE)]
+    assert "not followed" in pointless[2].doc.text
+
+
+def test_a_sidestep_that_fails_takes_no_other_way_with_it(
+    planned: tuple[Dsm, PlanRecord, Path], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def broken(*_: Any) -> None:
+        raise ZeroDivisionError("unforeseen")
+
+    monkeypatch.setattr("server.obstacles.sidestep_task.sidestep", broken)
+    ways = prepare(coming(planned, alert=alert()), report=lambda *_: None)
+    assert [way.doc.kind for way in ways] == ["over", "around", "sidestep"]
+    assert not ways[2].doc.possible
+    assert ways[2].doc.text
+    assert all(way.doc.text != ways[2].doc.text for way in ways[:2])
+    assert "Looking for the way: sidestep failed." in caplog.text
 
 
 def test_the_ceiling_counts_from_the_plan_and_the_vehicle_is_as_large_as_it_is(

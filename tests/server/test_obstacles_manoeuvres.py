@@ -143,23 +143,48 @@ def test_a_worker_that_fails_costs_this_manoeuvre_only() -> None:
     desk = Desk(RuntimeError("broken"), (prepared(),))
     desk.manoeuvres.on_alert(alert("a"))
     asyncio.run(desk.until(lambda: desk.watch.state.manoeuvres))
-    (none,) = desk.watch.state.manoeuvres
-    assert (none.for_alert, none.possible, desk.watch.state.busy) == ("a", False, "")
-    assert none.text
+    none = desk.watch.state.manoeuvres
+    assert [(doc.kind, doc.for_alert, doc.possible) for doc in none] == [("over", "a", False), ("around", "a", False)]
+    assert all(doc.text for doc in none)
+    assert desk.watch.state.busy == ""
     desk.manoeuvres.on_alert(alert("b"))
     asyncio.run(desk.until(lambda: any(each.doc.possible for each in desk.manoeuvres.prepared)))
     assert desk.asked == ["a", "b"]
 
 
-@pytest.mark.parametrize(("what", "kind"), [(alert("a"), "over"), (approach(), "sidestep")])
-def test_why_nothing_can_be_offered_is_told(what: Any, kind: str) -> None:
+@pytest.mark.parametrize(
+    ("there", "kinds"),
+    [
+        ([alert("a")], ["over", "around"]),
+        ([approach()], ["sidestep"]),
+        ([alert("a"), approach()], ["over", "around", "sidestep"]),
+    ],
+)
+def test_why_nothing_can_be_offered_is_told_of_each_way(there: list[Any], kinds: list[str]) -> None:
     desk = Desk()
     desk.sees = lambda standing, moving: None
-    desk.manoeuvres.on_alert(what)
+    for each in there:
+        desk.manoeuvres.on_alert(each)
     asyncio.run(desk.until(lambda: desk.watch.state.manoeuvres))
-    (none,) = desk.watch.state.manoeuvres
-    assert (none.kind, none.possible, none.text) == (kind, False, manoeuvres.NOTHING_KNOWN)
+    none = desk.watch.state.manoeuvres
+    assert [(doc.kind, doc.possible, doc.text) for doc in none] == [
+        (kind, False, manoeuvres.NOTHING_KNOWN) for kind in kinds
+    ]
     assert desk.asked == []
+
+
+def test_a_sidestep_beside_an_obstacle_that_fails_when_it_is_flown_says_why_and_stays_on_show() -> None:
+    desk = Desk((prepared(), prepared("around"), side(5.0)), NotReadyError("The surface model was deleted.", advice=""))
+    desk.manoeuvres.on_alert(alert())
+    desk.manoeuvres.on_alert(approach())
+    asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
+    with pytest.raises(NotAllowedError, match="model was deleted"):
+        desk.request("sidestep-t7")
+    assert [(doc.kind, doc.possible) for doc in desk.watch.state.manoeuvres] == [
+        ("over", False),
+        ("around", False),
+        ("sidestep", False),
+    ]
 
 
 def test_of_a_vehicle_that_stands_disarmed_nothing_is_sought_and_no_flight_is_spoken_of() -> None:
