@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from mapping.geometry.frames import moved_deg
-from server.errors import CheckNeededError, ConflictError, NotFoundError
-from server.flying.in_flight import home_desk
+from server.errors import CheckNeededError, ConflictError, NotFoundError, NotReadyError
+from server.flying.in_flight import home_desk, way_desk
 from server.flying.in_flight.home_desk import HomeDesk
 from server.flying.in_flight.way_desk import WayDesk
 from server.heard.channel import Channel
@@ -224,6 +224,79 @@ def test_a_home_that_was_judged_is_not_set_once_home_or_vehicle_is_another(
         with pytest.raises(ConflictError, match="Another vehicle"):
             await another
         assert (bench.desk.state.asked, bench.vehicle.told, bench.sets) == (None, [], 0)
+
+    runner.run(scenario())
+
+
+def test_a_home_near_whose_return_more_is_seen_since_it_was_judged_is_not_set(
+    made: Made, lane: Lane, runner: asyncio.Runner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        radar, home = bench.watch.mirrors["radar"], home_of(bench.state)
+        assert home is not None
+        origin = MapOrigin(home.lat_deg, home.lon_deg, home.alt_amsl_m)
+        told: dict[str, Any] = {"origin": origin, "resolution_m": 1.0, "began_mono_s": 1.0}
+        aside = [(10, 12, 1), (10, 12, 2)]
+        radar.fold(delta(aside, whole=True, **told))
+        doc = await bench.asked(20.0)
+        assert doc.ret is not None
+        assert doc.ret.state == "certified", doc.ret.reasons
+        mast = [(10, 0, up) for up in range(3)]
+        radar.fold(delta(mast, since=1, revision=2, **told))
+        with pytest.raises(CheckNeededError, match="seen more near the return to that home") as refused:
+            await bench.desk.set(ME, SetHomeBody(id=doc.id))
+        assert refused.value.advice == "Ask for home again."
+        bench.live.state = replace(bench.state, ground_speed_m_s=5.0)
+        with pytest.raises(CheckNeededError, match="seen more near") as refused:
+            await bench.desk.set(ME, SetHomeBody(id=doc.id))
+        assert refused.value.advice == "Hold, then ask for home again."
+        monkeypatch.setattr(way_desk, "SEEN_WITHIN_S", 0.0)
+        radar.fold(delta(aside, whole=True, revision=3, parts=2, **told))
+        with pytest.raises(NotReadyError, match="Parts of the radar map"):
+            await bench.desk.set(ME, SetHomeBody(id=doc.id))
+        assert (bench.vehicle.told, bench.sets) == ([], 0)
+        # The mast is gone; what is seen is what was seen, a metre beside it, and something far away.
+        beside = [(11, 12, 1), (-300, 0, 9)]
+        radar.fold(delta(beside, whole=True, revision=3, part=1, parts=2, **told))
+        await bench.desk.set(ME, SetHomeBody(id=doc.id))
+        assert bench.vehicle.told == [SetHome(ME, doc.lat_deg, doc.lon_deg, doc.alt_amsl_m)]
+
+    runner.run(scenario())
+
+
+def test_a_home_whose_return_was_not_certified_anyway_is_set_whatever_is_seen(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        bench.vehicle.parameters = {}
+        doc = await bench.asked(20.0)
+        assert doc.ret is not None
+        assert doc.ret.state == "not_certified"
+        if doc.ret.instead:
+            asked = bench.desk._asked
+            assert asked is not None
+            ret = doc.ret.model_copy(update={"instead": False})
+            bench.desk._asked = replace(asked, doc=doc.model_copy(update={"ret": ret}))
+        bench.watch.mirrors["radar"].expect()
+        await bench.desk.set(ME, SetHomeBody(id=doc.id))
+        assert bench.vehicle.told
+
+    runner.run(scenario())
+
+
+@pytest.mark.parametrize("up_m", [0.0, 30.0])
+def test_a_home_that_was_judged_on_the_ground_is_not_set_in_the_air_nor_the_other_way_round(
+    made: Made, lane: Lane, runner: asyncio.Runner, up_m: float
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane, up_m=up_m)
+        doc = await bench.asked(20.0 if up_m else None)
+        bench.live.state = replace(bench.state, armed=True, landed="on_ground" if up_m else "in_air")
+        with pytest.raises(CheckNeededError, match="has landed since" if up_m else "has taken off since"):
+            await bench.desk.set(ME, SetHomeBody(id=doc.id))
+        assert bench.vehicle.told == []
 
     runner.run(scenario())
 

@@ -14,7 +14,8 @@ from dataclasses import dataclass, replace
 
 from mapping.errors import DescribedError
 from mapping.geometry.frames import apart_m
-from server.errors import CheckNeededError, ConflictError, NotFoundError, reported
+from server.errors import ConflictError, NotFoundError, reported
+from server.flying.in_flight.home_asked import AskedHome
 from server.flying.in_flight.home_task import HomeJudged, judge_home, judge_return
 from server.flying.in_flight.way_desk import WayDesk
 from server.flying.in_flight.way_task import WayAsked
@@ -30,7 +31,6 @@ from server.schemas import (
     SetHomeBody,
     WayBody,
 )
-from server.schemas.flight_docs import CHECK_FRESH_S
 from server.work.jobs import Lane
 from telemetry.bus.bus import Bus
 from telemetry.bus.link_client import LinkClient
@@ -46,8 +46,6 @@ ANYWHERE = WayBody(action="home")
 FLOWN_M, OLD_S, OLDEST_S = 10.0, 15.0, 60.0
 """A return is judged again from so far away, and after so long wherever it is, while home lies elsewhere than at the
 take-off: sensors see more meanwhile."""
-MOVED_M = 2.0
-"""A vehicle that was moved further is not "here" any more."""
 NEW_MAP_S, PAUSE_SHARE = 5.0, 3.0
 """A return is judged again so soon where sensors have seen other things, and once so many times as long as a judgement
 takes have passed: what looks all the time keeps no processor busy all the time."""
@@ -56,6 +54,7 @@ CRITICAL = 2
 NO_MORE = "Ground station: the vehicle's return was certified, and is not any more"
 """It stands among what the vehicle says."""
 HOME_MOVED_AGAIN = "Home has moved again."
+JUDGED_MEANWHILE = "Another home was judged meanwhile."
 LOOK_EVERY_S = 1.0
 
 
@@ -90,8 +89,7 @@ class HomeDesk:
         home was, or may have been, set by order; ``bus``: what is said there is recorded, and told to all pages."""
         self._link, self._live, self._ways, self._lane, self._pages = link, live, ways, lane, pages
         self._server, self._home_set, self._bus = server, home_set, bus
-        self._asked: HomeAskedDoc | None = None
-        self._asked_mono_s = 0.0
+        self._asked: AskedHome | None = None
         self._is_judging = self._is_judging_return = False
         self._judged: _Judged | None = None
         self._holds = False
@@ -101,8 +99,6 @@ class HomeDesk:
         self._adopted: str | None = None
         self._gathered: WayAsked | None = None
         """What was read from the vehicle while home stood where it does: it is not read again for each judgement."""
-        self._asked_at: tuple[HomePlace | None, tuple[float | None, float | None]] | None = None
-        """Of ``_asked``: home, and where the vehicle was."""
         self._took_s = 0.0
         self._lacks_maps = False
         """The return is unknown because parts of a map are missing."""
@@ -112,7 +108,7 @@ class HomeDesk:
     @property
     def state(self) -> HomeState:
         return HomeState(
-            asked=self._asked,
+            asked=None if self._asked is None else self._asked.doc,
             is_judging=self._is_judging,
             ret=None if self._judged is None else self._judged.doc,
             is_judging_return=self._is_judging_return,
@@ -130,24 +126,27 @@ class HomeDesk:
             judged: HomeJudged = await self._lane.call(judge_home, asked, place)
             if vehicle != self._adopted:
                 raise ConflictError("Another vehicle was adopted meanwhile.", advice="Ask for home again.")
-            self._asked_at = home_of(asked.state), (asked.state.lat_deg, asked.state.lon_deg)
-            self._asked, self._asked_mono_s = self._doc(judged, asked.state, is_here=place is None), time.monotonic()
+            doc = self._doc(judged, asked.state, is_here=place is None)
+            self._asked = AskedHome(doc, time.monotonic(), asked.state, asked.maps, judged.required_m)
         finally:
             self._is_judging = False
             self._tell()
         return self.state
 
     async def set(self, operator: Operator, body: SetHomeBody) -> None:
-        """Raises NotFoundError, CheckNeededError, and what the vehicle said."""
+        """Raises NotFoundError, CheckNeededError, NotReadyError where parts of a map are missing, and what the vehicle
+        said."""
         asked = self._asked
-        if asked is None or asked.id != body.id:
-            raise NotFoundError("Another home was judged meanwhile.", advice="Ask for it again.")
-        if time.monotonic() - self._asked_mono_s > CHECK_FRESH_S:
-            what = f"That home was judged more than {CHECK_FRESH_S:.0f} s ago."
-            raise CheckNeededError(what, advice="Ask for it again.")
-        self._check_still(asked)
+        if asked is None or asked.doc.id != body.id:
+            raise NotFoundError(JUDGED_MEANWHILE, advice="Ask for it again.")
+        asked.check_still(self._live.state)
+        await asked.check_seen(self._live.state, self._ways)
+        asked.check_still(self._live.state)
+        if self._asked is not asked:
+            raise NotFoundError(JUDGED_MEANWHILE, advice="Ask for it again.")
+        doc = asked.doc
         try:
-            await self._link.call(SetHome(operator, asked.lat_deg, asked.lon_deg, asked.alt_amsl_m))
+            await self._link.call(SetHome(operator, doc.lat_deg, doc.lon_deg, doc.alt_amsl_m))
         finally:
             self._home_set()
         if self._asked is asked:
@@ -218,20 +217,6 @@ class HomeDesk:
         self._gathered = None
         self._moved.set()
         self._tell()
-
-    def _check_still(self, asked: HomeAskedDoc) -> None:
-        """Raises CheckNeededError where home, or for "here" the vehicle, is not where it was when that was judged."""
-        state, at = self._live.state, self._asked_at
-        if state is None or at is None:
-            raise CheckNeededError("The vehicle is not heard.", advice="Connect it, then ask for home again.")
-        home, (lat_deg, lon_deg) = at
-        if home is None or not is_there(home_of(state), home):
-            raise CheckNeededError("Home was moved since that was judged.", advice="Ask for home again.")
-        if not asked.is_here:
-            return
-        known = lat_deg is not None and lon_deg is not None and state.lat_deg is not None and state.lon_deg is not None
-        if not known or apart_m((lat_deg or 0, lon_deg or 0), (state.lat_deg or 0, state.lon_deg or 0)) > MOVED_M:
-            raise CheckNeededError("The vehicle has moved since that was judged.", advice="Ask for home again.")
 
     def _is_due(self) -> bool:
         state, judged = self._live.state, self._judged

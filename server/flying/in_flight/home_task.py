@@ -26,6 +26,8 @@ class HomeJudged:
     home: HomePlace
     ret: ReturnDoc | None
     """Of the vehicle's own return to it; None: the vehicle stands on the ground."""
+    required_m: float = 0.0
+    """That the return must keep from everything."""
 
 
 def judge_home(asked: WayAsked, place: tuple[float, float] | None, *, report: Progress) -> HomeJudged:
@@ -37,11 +39,16 @@ def judge_home(asked: WayAsked, place: tuple[float, float] | None, *, report: Pr
     # Without a take-off that was heard, home as it is now was found to lie on the ground.
     took_off = asked.took_off or home_of(asked.state)
     there = replace(asked, state=_with_home(asked.state, home), took_off=took_off)
-    return HomeJudged(home, judge_return(there, report=report))
+    return HomeJudged(home, *_judged_return(there, report))
 
 
 def judge_return(asked: WayAsked, *, report: Progress) -> ReturnDoc:
     """From where the vehicle is; where that is not certified, whether a guided way home is."""
+    return _judged_return(asked, report)[0]
+
+
+def _judged_return(asked: WayAsked, report: Progress) -> tuple[ReturnDoc, float]:
+    """With the clearance that it must keep."""
     now_s = time.monotonic()
     try:
         lat_deg, lon_deg = _at(asked.state)
@@ -49,15 +56,16 @@ def judge_return(asked: WayAsked, *, report: Progress) -> ReturnDoc:
         way = judge_way(replace(asked, body=here), report=report).way
     except DescribedError as error:
         reason = ReasonDoc(code="home", text=error.what, mend=error.advice)
-        return ReturnDoc(state="unknown", reasons=[reason], judged_mono_s=now_s)
+        return ReturnDoc(state="unknown", reasons=[reason], judged_mono_s=now_s), 0.0
     reasons = [ReasonDoc(code=each.code, text=each.text, mend=each.mend) for each in way.certificate.reasons]
-    return ReturnDoc(
+    doc = ReturnDoc(
         state="certified" if way.problem is None else "not_certified",
         reasons=reasons,
         clearance_m=way.clearance_m if math.isfinite(way.clearance_m) else None,
         instead=way.problem is not None and _is_way_home_certified(asked, report),
         judged_mono_s=now_s,
     )
+    return doc, way.certificate.required_clearance_m
 
 
 def _is_way_home_certified(asked: WayAsked, report: Progress) -> bool:

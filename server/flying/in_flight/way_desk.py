@@ -226,18 +226,24 @@ class WayDesk:
         seen = await seen_maps(self._watch)
         return not await asyncio.to_thread(is_same_seen, asked.maps, seen)
 
+    async def has_seen_more_near(
+        self, maps: tuple[Voxels, ...], line_deg: list[tuple[float, float]], clearance_m: float
+    ) -> bool:
+        """Whether sensors have seen more by now than ``maps``, so near to a line (lat_deg, lon_deg) that keeps such a
+        clearance that it may matter. Raises NotReadyError where nobody knows."""
+        seen = await seen_maps(self._watch, SEEN_WITHIN_S)
+        # Of a take-off who walks about farther away is no matter: nothing is flown along yet that could be behind him.
+        near_m = clearance_m + (SHADOW_M if is_in_the_air(self._vehicle()) else 0.0)
+        return await asyncio.to_thread(is_more_seen_near, maps, seen, line_deg, near_m)
+
     # How
 
     async def _check_seen(self, in_hand: _InHand) -> None:
         """Raises CheckNeededError where sensors have seen more near the way, or near the return from it, since it was
         judged; NotReadyError where nobody knows."""
-        seen = await seen_maps(self._watch, SEEN_WITHIN_S)
         way, home = in_hand.judged.way, in_hand.home
         line_deg = [place[:2] for place in way.places] + ([] if home is None else [(home.lat_deg, home.lon_deg)])
-        # Of a take-off who walks about farther away is no matter: nothing is flown along yet that could be behind him.
-        shadow_m = SHADOW_M if is_in_the_air(self._vehicle()) else 0.0
-        near_m = shadow_m + way.certificate.required_clearance_m
-        sees_more = await asyncio.to_thread(is_more_seen_near, in_hand.maps, seen, line_deg, near_m)
+        sees_more = await self.has_seen_more_near(in_hand.maps, line_deg, way.certificate.required_clearance_m)
         if self._in_hand is not in_hand:
             raise NotFoundError(NOWHERE, advice="Ask for the way again.")
         if sees_more:
