@@ -78,8 +78,8 @@ class MapMirror:
     _began_mono_s: float = 0.0
     """As the sensor's node says it."""
     _flies: bool = False
-    _is_of_before: bool = False
-    """What is in the map was seen in a flight before."""
+    _before_mono_s: float | None = None
+    """Beginning of the map that was here when a flight was over last: however often that is told again, it is of it."""
     _clear_count: int | None = None
     """Of the order by which all maps were emptied last: what was told before it is void. None: none was given."""
     _parts_in: int = 0
@@ -101,6 +101,7 @@ class MapMirror:
         """As if nothing had ever been heard."""
         with self._lock:
             self._empty()
+            self._before_mono_s = None
             self._kept.forget()
             self._count()
 
@@ -111,9 +112,10 @@ class MapMirror:
             if flies != self._flies:
                 self._flies = flies
                 self._kept.forget()
+                if not flies and self.origin is not None:
+                    self._before_mono_s = self._began_mono_s
                 if not flies and not self.is_complete:
                     self._empty()
-                self._is_of_before |= not flies
                 self._count()
 
     def dismiss(self, clear_count: int) -> None:
@@ -122,6 +124,7 @@ class MapMirror:
         with self._lock:
             self._clear_count = clear_count
             self._empty()
+            self._before_mono_s = None  # a map that was emptied goes on as what it was
             self._kept.forget()
             self._count()
 
@@ -227,7 +230,7 @@ class MapMirror:
         self._chunks, self._retold = {}, None
         self.origin, self.resolution_m, self.revision, self._began_mono_s = None, 0.0, 0, 0.0
         self._parts_in = self._parts = 0
-        self._lacks = self._is_of_before = False
+        self._lacks = False
         self.generation += 1
 
     def _begin(self, delta: MapDelta, *, is_first: bool) -> None:
@@ -243,13 +246,13 @@ class MapMirror:
 
     def _begin_anew(self, delta: MapDelta) -> None:
         """Another map is told: the one that was here counts on where it was seen in this flight."""
-        if self._flies and self.origin is not None and not self._is_of_before:
+        if self._flies and self.origin is not None and self._began_mono_s != self._before_mono_s:
             for chunks in (self._chunks, self._retold or {}):
                 self._kept.keep((self.origin, self.resolution_m), _unexplained_ids(chunks))
             # What never came of it was seen, too; of a retelling the map before it is here, whole.
             self._kept.is_over_full |= self._lacks or (self._parts_in < self._parts and self._retold is None)
         self._forget()
-        self._retold, self._is_of_before = None, False
+        self._retold = None
         if (self.origin, self.resolution_m) != (delta.origin, delta.resolution_m):
             self.generation += 1
         self.origin, self.resolution_m, self._began_mono_s = delta.origin, delta.resolution_m, delta.began_mono_s

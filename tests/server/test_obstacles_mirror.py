@@ -211,6 +211,34 @@ def test_what_was_seen_in_a_flight_before_is_not_kept_in_this_one() -> None:
     assert kept_in(mirror) == set()
 
 
+@pytest.mark.parametrize("came", ["a part of it", "all of it"])
+def test_a_map_of_a_flight_before_that_is_told_again_stays_one(came: str) -> None:
+    """From its start, by the node or the bus, whatever of it was here."""
+    mirror = in_flight()
+    if came == "a part of it":
+        mirror.fold(delta([CRANE], whole=True, revision=8, parts=2, began_mono_s=1.0))
+    mirror.on_flight(flies=False)
+    for revision in (8, 3):
+        mirror.fold(delta([CRANE], whole=True, revision=revision, began_mono_s=1.0))
+    mirror.on_flight(flies=True)
+    mirror.fold(delta([CRANE], whole=True, revision=2, began_mono_s=1.0))
+    mirror.fold(delta([(1, 1, 9)], whole=True, revision=1, began_mono_s=2.0))
+    assert kept_in(mirror) == {(1, 1, 9)}, "the crane is of the flight before"
+    mirror.fold(delta([], whole=True, revision=0, began_mono_s=3.0))
+    assert kept_in(mirror) == {(1, 1, 9)}, "what was seen since counts where its node dies"
+
+
+def test_a_map_that_was_emptied_on_the_ground_is_of_the_flight_that_follows() -> None:
+    mirror = in_flight()
+    mirror.on_flight(flies=False)
+    mirror.dismiss(1)
+    mirror.fold(delta([], whole=True, revision=9, began_mono_s=1.0, clear_count=1))
+    mirror.on_flight(flies=True)
+    mirror.fold(delta([CRANE], since=9, revision=10, began_mono_s=1.0, clear_count=1))
+    mirror.fold(delta([], whole=True, revision=0, began_mono_s=2.0, clear_count=1))
+    assert kept_in(mirror) == {CRANE}
+
+
 def test_a_map_that_never_came_whole_is_waited_for_no_longer_than_the_flight() -> None:
     mirror = in_flight()
     mirror.fold(delta([CRANE], whole=True, revision=8, parts=2, began_mono_s=1.0))
