@@ -6,6 +6,7 @@ the place of the one here with its last part: a node that dies meanwhile takes n
 
 from __future__ import annotations
 
+import math
 import threading
 from dataclasses import dataclass, field
 
@@ -22,6 +23,8 @@ CHUNK_M = 32.0
 OCCUPIED_ABOVE = 127
 DETAILS = (1, 2, 4, 8, 16)
 """Edges in voxels of what a drawn box may stand for."""
+NEXT_NODE_S = 1.0
+"""So long after the last word of a node that died nothing of the next one begins yet."""
 _BITS = 20
 _OFFSET = 1 << (_BITS - 1)
 """Keys beyond +-500,000 voxels are nobody's: 250 km of the finest map."""
@@ -86,6 +89,10 @@ class MapMirror:
     _parts: int = 0
     _lacks: bool = False
     """Something before the newest delta is missing: only the whole map mends that."""
+    _untold_mono_s: float = -math.inf
+    """Newest word of a map of which nothing has come; inf: what there was is emptied by order."""
+    _untold_run: str = ""
+    """Of the node that said it."""
     _chunks: dict[ChunkKey, Chunk] = field(default_factory=dict)
     _retold: dict[ChunkKey, Chunk] | None = None
     """Of the same map, told once more; None: it is not."""
@@ -114,6 +121,7 @@ class MapMirror:
                 self._kept.forget()
                 if not flies and self.origin is not None:
                     self._before_mono_s = self._began_mono_s
+                self._expect_nothing()  # what was waited for is of before
                 if not flies and not self.is_complete:
                     self._empty()
                 self._count()
@@ -125,13 +133,22 @@ class MapMirror:
             self._clear_count = clear_count
             self._empty()
             self._before_mono_s = None  # a map that was emptied goes on as what it was
+            self._untold_mono_s = math.inf
             self._kept.forget()
             self._count()
 
-    def expect(self) -> None:
-        """Its node says that it holds something; if nothing of it was heard, that is missing."""
+    def expect(self, t_mono_s: float, run: str = "") -> None:
+        """Its node says that it holds something; if nothing of it was heard, that is missing. ``t_mono_s``: of the
+        newest frame in it; ``run``: of the node, "" where it does not say. Another run: what the one before held died
+        with it."""
         with self._lock:
-            self._lacks |= self.origin is None
+            if self.origin is not None:
+                return
+            if run and self._untold_run and run != self._untold_run:
+                self._lose_untold()
+            self._lacks, self._untold_run = True, run or self._untold_run
+            self._untold_mono_s = max(self._untold_mono_s, t_mono_s)
+            self._count()
 
     def fold(self, delta: MapDelta) -> bool:
         """Whether nothing is missing before it. Raises ValueError when the delta's arrays do not belong together."""
@@ -231,6 +248,7 @@ class MapMirror:
         self.origin, self.resolution_m, self.revision, self._began_mono_s = None, 0.0, 0, 0.0
         self._parts_in = self._parts = 0
         self._lacks = False
+        self._expect_nothing()
         self.generation += 1
 
     def _begin(self, delta: MapDelta, *, is_first: bool) -> None:
@@ -251,11 +269,21 @@ class MapMirror:
                 self._kept.keep((self.origin, self.resolution_m), _unexplained_ids(chunks))
             # What never came of it was seen, too; of a retelling the map before it is here, whole.
             self._kept.is_over_full |= self._lacks or (self._parts_in < self._parts and self._retold is None)
+        if self.origin is None and delta.began_mono_s > self._untold_mono_s + NEXT_NODE_S:
+            self._lose_untold()
+        self._expect_nothing()
         self._forget()
         self._retold = None
         if (self.origin, self.resolution_m) != (delta.origin, delta.resolution_m):
             self.generation += 1
         self.origin, self.resolution_m, self._began_mono_s = delta.origin, delta.resolution_m, delta.began_mono_s
+
+    def _lose_untold(self) -> None:
+        """A map of this flight is gone of which nothing ever came."""
+        self._kept.is_over_full |= self._flies and math.isfinite(self._untold_mono_s)
+
+    def _expect_nothing(self) -> None:
+        self._untold_mono_s, self._untold_run = -math.inf, ""
 
     def _end_retelling(self) -> None:
         """Its last part never came: what did counts beside what was there."""

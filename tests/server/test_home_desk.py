@@ -279,7 +279,7 @@ def test_a_home_whose_return_was_not_certified_anyway_is_set_whatever_is_seen(
             assert asked is not None
             ret = doc.ret.model_copy(update={"instead": False})
             bench.desk._asked = replace(asked, doc=doc.model_copy(update={"ret": ret}))
-        bench.watch.mirrors["radar"].expect()
+        bench.watch.mirrors["radar"].expect(10.0)
         await bench.desk.set(ME, SetHomeBody(id=doc.id))
         assert bench.vehicle.told
 

@@ -115,7 +115,7 @@ def test_they_come_with_the_alert_and_go_with_it() -> None:
 
 def test_what_is_offered_over_half_a_map_says_so() -> None:
     desk = Desk((prepared("over"), prepared("around", possible=False)))
-    desk.watch.mirrors["radar"].expect()
+    desk.watch.mirrors["radar"].expect(10.0)
     desk.manoeuvres.on_alert(alert())
     asyncio.run(desk.until(lambda: desk.manoeuvres.prepared))
     assert [doc.text for doc in desk.watch.state.manoeuvres] == [f"Climb. {manoeuvres.PARTS_MISSING}", "Climb."]

@@ -138,7 +138,7 @@ def test_what_is_emptied_by_order_is_gone_however_the_node_answers(answer: dict[
     # Told before its node heard of the order.
     assert mirror.fold(delta([CRANE], since=7, revision=8, began_mono_s=1.5, clear_count=4))
     assert mirror.seen() == ()
-    mirror.expect()
+    mirror.expect(10.0)
     assert mirror.seen() is None, "its node has not answered yet, and holds something"
     mirror.fold(delta([], whole=True, clear_count=5, **answer))
     assert (kept_in(mirror), mirror.has_forgotten) == (set(), False)
@@ -301,12 +301,59 @@ def test_half_a_map_is_not_taken_for_one(lost: int) -> None:
 def test_what_is_said_to_be_there_and_was_not_heard_is_missing() -> None:
     mirror = MapMirror("radar")
     assert mirror.seen() == ()
-    mirror.expect()
+    mirror.expect(10.0)
     assert mirror.seen() is None
     mirror.fold(delta([CRANE], whole=True))
     assert kept_in(mirror) == {CRANE}
-    mirror.expect()
+    mirror.expect(10.0)
     assert mirror.is_complete
+
+
+@pytest.mark.parametrize(
+    ("words", "began_mono_s", "is_lost"),
+    [
+        ([(20.0, "a")], 3.0, False),
+        ([(20.0, "a")], 20.4, False),  # it was told a little after it was said to hold something
+        ([(20.0, "a"), (24.0, "a")], 24.4, False),
+        ([(20.0, "a")], 23.0, True),
+        ([(20.0, "")], 23.0, True),
+        ([(20.0, "a"), (24.0, "b")], 22.5, True),  # both runs hold something, of the first nothing came
+        ([(20.0, "a"), (24.0, "")], 22.5, False),  # a tick does not say whose
+        ([], 23.0, False),
+    ],
+)
+def test_a_map_that_was_never_heard_and_died_with_its_node_is_said_to_be_lost(
+    words: list[tuple[float, str]], began_mono_s: float, *, is_lost: bool
+) -> None:
+    for flies in (True, False):
+        mirror = MapMirror("radar")
+        mirror.on_flight(flies=flies)
+        for t_mono_s, run in words:
+            mirror.expect(t_mono_s, run)
+        mirror.fold(delta([CRANE], whole=True, began_mono_s=began_mono_s))
+        assert mirror.has_forgotten is (is_lost and flies), "on the ground nobody counts on it"
+        assert kept_in(mirror) == {CRANE}
+        mirror.fold(delta([], whole=True, began_mono_s=began_mono_s + 50.0))
+        assert mirror.has_forgotten is (is_lost and flies), "what came is kept"
+        mirror.dismiss(1)
+        assert not mirror.has_forgotten
+
+
+def test_what_was_waited_for_before_the_flight_is_not_lost_in_it() -> None:
+    mirror = MapMirror("radar")
+    mirror.expect(20.0, "a")
+    mirror.on_flight(flies=True)
+    mirror.fold(delta([CRANE], whole=True, began_mono_s=40.0))
+    assert (mirror.has_forgotten, kept_in(mirror)) == (False, {CRANE})
+
+
+def test_of_what_was_emptied_by_order_nothing_is_lost_however_late_its_node_answers() -> None:
+    mirror = in_flight()
+    mirror.dismiss(1)
+    for t_mono_s, run in ((20.0, "a"), (21.0, "b")):
+        mirror.expect(t_mono_s, run)
+    mirror.fold(delta([CRANE], whole=True, began_mono_s=30.0, clear_count=1))
+    assert (mirror.has_forgotten, kept_in(mirror)) == (False, {CRANE})
 
 
 def test_what_does_not_belong_together_is_refused_and_absurd_keys_are_left_out() -> None:

@@ -15,7 +15,7 @@ from server.errors import NotReadyError
 from server.obstacles.obstacle_watch import DEAD_S, LATE_S, Watch
 from server.obstacles.surroundings import are_maps_whole, seen_maps
 from telemetry.perception.map_changes import ChangeTeller
-from telemetry.topics.obstacles import AvoidanceStatus, FlightMapStatus
+from telemetry.topics.obstacles import AvoidanceStatus, Basis, FlightMapStatus
 from telemetry.topics.vehicle import VehicleState
 from tests.server.fakes import Told
 from tests.server.obstacle_messages import ORIGIN, alert, delta, status
@@ -346,6 +346,23 @@ def test_maps_that_can_not_be_told_yet_are_not_waited_for() -> None:
         assert asyncio.run(seen_maps(watch)) == ()
         watch.on_status(status("vision", voxels_occupied=40))
         assert watch.mirrors["vision"].seen() is None
+
+
+def test_a_map_that_died_unheard_is_said_to_be_lost() -> None:
+    async def scenario() -> None:
+        watch, _, _ = watching()
+        await watch.on_flight(flies=False)
+        await watch.on_flight(flies=True)
+        watch.on_status(status(voxels_occupied=3, basis=Basis(10.0, run="a")))
+        assert not watch.state.alerts
+        watch.on_status(status(voxels_occupied=1, basis=Basis(14.0, run="b")))
+        (said,) = [each.alert for each in watch.state.alerts]
+        assert said.text.startswith("Not all that the radar had seen before its map began anew could be kept")
+        await watch.on_map(delta(CRANE, whole=True, began_mono_s=9.0))
+        with pytest.raises(NotReadyError, match="not all that it had seen could be kept"):
+            await seen_maps(watch)
+
+    asyncio.run(scenario())
 
 
 def test_a_server_that_begins_in_flight_waits_for_each_running_node_and_says_what_may_be_missing(
