@@ -138,17 +138,21 @@ class ObstacleDesk:
         await self._link.call(await self._manoeuvres.request(operator, manoeuvre_id))
 
     async def plan_with_seen(self, body: PlanWithSeen) -> PlanState:
-        """Raises NotReadyError when nothing was seen, and for a part when no mission is flown."""
+        """With what was seen before a map began anew in this flight. Raises NotReadyError when nothing was seen, and
+        for a part when no mission is flown."""
         if not body.seen:
             return await self._plans.plan_without_seen()
-        maps = [await asyncio.to_thread(self._live.mirrors[sensor].voxels) for sensor in body.sensors]
+        mirrors = [self._live.mirrors[sensor] for sensor in dict.fromkeys(body.sensors)]
+        maps = [seen for mirror in mirrors for seen in await asyncio.to_thread(mirror.seen_so_far)]
         maps = [seen for seen in maps if len(seen.keys) and not seen.explained.all()]
         if not maps:
             raise NotReadyError(
                 "Nothing was seen that the surface model does not know.", advice="Fly on, or plan as is."
             )
         live = self._around.live
-        seen = maps, live.state, home_of_takeoff(live.track.states)
+        began_anew = [f"the {mirror.sensor} map" for mirror in mirrors if mirror.kept_count]
+        also = f", also before {' and '.join(began_anew)} began anew" if began_anew else ""
+        seen = maps, live.state, home_of_takeoff(live.track.states), f"Plan against what was seen{also}"
         if body.part == "whole":
             return await self._plans.plan_with_seen(*seen)
         part, underway = body.part, self._around.underway

@@ -315,7 +315,7 @@ class Watch:
             self._tell_lasting(
                 f"kept-{name}",
                 name,
-                f"The {name} map began anew: what {_HAD_SEEN[name]} counts for ways and returns {_UNTIL}.",
+                f"The {name} map began anew: what {_HAD_SEEN[name]} counts for ways, returns and plans {_UNTIL}.",
                 over=f"Nothing that the {name} saw before counts any more.",
                 holds=mirror.kept_count > 0,
             )

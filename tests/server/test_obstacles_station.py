@@ -129,7 +129,7 @@ def test_a_killed_radar_leaves_the_camera_and_comes_back_and_what_it_saw_counts(
     flying.until(both, LONG_S)
     told = obstacles(flying, lambda state: any(each.alert.id.startswith("kept-radar") for each in state.alerts))
     kept = next(each for each in told.alerts if each.alert.id.startswith("kept-radar"))
-    assert "what it had seen counts for ways and returns" in kept.alert.text
+    assert "what it had seen counts for ways, returns and plans" in kept.alert.text
     again = running_node(run, "radar")
     assert again is not None
     assert again.pid != facts.pid
