@@ -20,7 +20,7 @@ from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Re
 from telemetry.agent.link_messages import TARGETS_MAX, Slam
 from telemetry.agent.live_radar import reading_of
 from telemetry.agent.ros2_status import Ros2Status
-from telemetry.recording.ros.bag_flight import attitude_of
+from telemetry.recording.placed_state import attitude_of
 from telemetry.recording.ros.bag_types import POINT_TYPES, POSE_TYPES, TF
 from telemetry.recording.ros.placing import BASE_LINK, FORWARD_LEFT_UP, MOST_GAP_S
 from telemetry.recording.ros.point_messages import MalformedMessageError, points_of

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from mapping.geometry.frames import attitude_rotation
 from telemetry.errors import RecordingError
-from telemetry.recording.ros.bag_flight import attitude_of
+from telemetry.recording.placed_state import attitude_of
 from telemetry.recording.ros.bag_types import TRANSFORM
 from telemetry.recording.ros.transforms import Gap, Transform, tree_of
 

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from mapping.geometry import quaternions
-from mapping.geometry.arrays import F64
 from mapping.geometry.frames import LocalFrame
 from mapping.sensor_frames import CloudFrame, RadarFrame, RangeFrame, SensorFrame, SlamPose, packed, thinned
 from telemetry.errors import RecordingError
 from telemetry.recording.mcap_files.writer import RecordingWriter
+from telemetry.recording.placed_state import attitude_of, state_at
 from telemetry.recording.ros.bag import BagContents, BagTable, Progress, read_bag
 from telemetry.recording.ros.bag_types import POINT_TYPES, POSE_TYPES, TF_TYPES
 from telemetry.recording.ros.placing import MOST_GAP_S, PlacedBag, PlacedCloud, PlacedPose, placed
@@ -33,7 +33,7 @@ _THINNED_M = 0.001
 """Of clouds that are mapped as a camera's: so every point counts, since nobody knows how often its sensor is wrong."""
 _REACHES = {"radar": "1.5 to 125 m from it", "vision": "0.3 to 40 m from it", "ranges": "0.1 to 120 m from it"}
 """Of each sensor's map."""
-_NOWHERE = (0.0, 0.0, 0.0)
+_NOWHERE = LocalFrame(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +128,7 @@ def _check_radar(bag: PlacedBag, sensor: Sensor) -> None:
         raise RecordingError(what, advice="Map it with --sensor vision, as dense clouds are.")
 
 
-def _home(contents: BagContents, bag: PlacedBag, asked: BagAsked) -> tuple[float, float, float]:
+def _home(contents: BagContents, bag: PlacedBag, asked: BagAsked) -> LocalFrame:
     """As declared, else by the NavSatFix nearest to the first pose; without either, or without its height, nowhere.
 
     Raises RecordingError where it is of another time.
@@ -136,7 +136,7 @@ def _home(contents: BagContents, bag: PlacedBag, asked: BagAsked) -> tuple[float
     if asked.home_alt_amsl_m is None:
         return _NOWHERE
     if asked.home_lat_lon_deg is not None:
-        return *asked.home_lat_lon_deg, asked.home_alt_amsl_m
+        return LocalFrame(*asked.home_lat_lon_deg, asked.home_alt_amsl_m)
     if not len(contents.places):
         return _NOWHERE
     apart_s = np.abs(contents.places["stamp_ns"] - bag.origin_ns) / 1e9
@@ -146,12 +146,12 @@ def _home(contents: BagContents, bag: PlacedBag, asked: BagAsked) -> tuple[float
         advice = f"At most {asked.most_gap_s:g} s are bridged; --max-gap-s bridges more, and without --home-alt-amsl-m"
         raise RecordingError(what, advice=f"{advice} no fix is needed.")
     place = contents.places[nearest]
-    return float(place["lat_deg"]), float(place["lon_deg"]), asked.home_alt_amsl_m
+    return LocalFrame(float(place["lat_deg"]), float(place["lon_deg"]), asked.home_alt_amsl_m)
 
 
 def _write(
     bag: PlacedBag,
-    home: tuple[float, float, float],
+    home: LocalFrame,
     sensor: Sensor,
     out: Path,
     name: str,
@@ -162,12 +162,11 @@ def _write(
     start_ns = bag.clouds[0].stamp_ns
     bare = any(np.isnan(cloud.speed_m_s).any() or np.isnan(cloud.snr_db).any() for cloud in bag.clouds)
     settings = replace(WIDEST, paper_bare=bare)
-    frame = LocalFrame(*home)
     writer = RecordingWriter(out, t_utc_s=start_ns / 1e9, t_mono_s=start_ns / 1e9, name=name, now=lambda: 0.0)
     writer.write(Topic.PERCEPTION_SETTINGS, settings, start_ns / 1e9)
     for number, cloud in enumerate(bag.clouds):
         t_s = cloud.stamp_ns / 1e9
-        writer.write(Topic.VEHICLE, _state(cloud.pose, frame, home), t_s)
+        writer.write(Topic.VEHICLE, _state(cloud.pose, home), t_s)
         if sensor == "vision":
             writer.write(Topic.SLAM_POSE, _camera(cloud.pose), t_s)
         topic, message = _frame(cloud, number, sensor)
@@ -186,28 +185,8 @@ def _notes_of(bag: PlacedBag, sensor: Sensor, *, bare: bool, fault: str) -> Iter
     yield f"A {sensor} map takes what is {ahead} {bag.base}, {_REACHES[sensor]}; points elsewhere are left out."
 
 
-def _state(pose: PlacedPose, frame: LocalFrame, home: tuple[float, float, float]) -> VehicleState:
-    t_s = pose.stamp_ns / 1e9
-    east, north, up = pose.p_enu_m.tolist()
-    # Coordinates are read at the height of home again.
-    lat_deg, lon_deg, _ = frame.to_geodetic([[east, north, 0.0]])[0].tolist()
-    heading_rad, pitch_rad, roll_rad = attitude_of(pose.R_enu_body)
-    v = (None, None, None) if pose.v_enu_m_s is None else pose.v_enu_m_s.tolist()
-    return VehicleState(
-        1, 1, t_utc_s=t_s, heartbeat_t_mono_s=t_s, armed=True, position_t_mono_s=t_s, lat_deg=lat_deg, lon_deg=lon_deg,
-        alt_amsl_m=home[2] + up, alt_rel_home_m=up, v_east_m_s=v[0], v_north_m_s=v[1],
-        v_down_m_s=None if v[2] is None else -v[2], attitude_t_mono_s=t_s, roll_rad=roll_rad, pitch_rad=pitch_rad,
-        heading_rad=heading_rad, home_lat_deg=home[0], home_lon_deg=home[1], home_alt_amsl_m=home[2],
-    )  # fmt: skip
-
-
-def attitude_of(R_enu_body: F64) -> tuple[float, float, float]:
-    """Heading, pitch and roll: the inverse of ``frames.attitude_rotation``."""
-    R = R_enu_body
-    pitch_rad = math.asin(min(1.0, max(-1.0, float(R[2, 1]))))
-    if math.hypot(R[2, 0], R[2, 2]) < 1e-9:  # straight up or down: only heading and roll together are known
-        return math.atan2(-R[1, 0], R[0, 0]) % (2 * math.pi), pitch_rad, 0.0
-    return quaternions.heading(R), pitch_rad, math.atan2(-R[2, 0], R[2, 2])
+def _state(pose: PlacedPose, home: LocalFrame) -> VehicleState:
+    return state_at(pose.stamp_ns / 1e9, pose.p_enu_m, pose.v_enu_m_s, pose.R_enu_body, home)
 
 
 def _camera(pose: PlacedPose) -> SlamPose:
