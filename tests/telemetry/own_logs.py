@@ -8,6 +8,8 @@ from typing import Any
 _LETTERS = {
     "Q": "Q",
     "B": "B",
+    "b": "b",
+    "C": "H",
     "M": "B",
     "H": "H",
     "I": "I",

@@ -32,7 +32,7 @@ from telemetry.topics.vehicle import VehicleState
 
 _WANTED = frozenset(
     [
-        *("ARM", "ATT", "BAT", "CMD", "CURR", "DSF", "ERR", "EV", "GPA", "GPS", "MISE", "MODE"),
+        *("AHR2", "ARM", "ATT", "BAT", "CMD", "CURR", "DSF", "ERR", "EV", "GPA", "GPS", "MISE", "MODE"),
         *("MSG", "NKF1", "NKF2", "ORGN", "PARM", "POS", "SIM", "XKF1", "XKF2"),
     ]
 )
@@ -48,6 +48,7 @@ _INFO, _ERROR = 6, 3
 """MAV_SEVERITY: the log keeps no severity with its texts."""
 _HOME = 1
 """ORGN.Type"""
+_ATTITUDES = ("ATT", "XKF1", "NKF1", "AHR2")
 _FAILURES = {
     2: "Radio",
     3: "Compass",
@@ -82,7 +83,7 @@ def read_dataflash_flight(data: Data) -> OwnLog:
     log = OwnLog(vehicle, middle_utc_s(gps_utc_s(gps), gps_t_s))
     log.facts = FrameFacts(vehicle.system_id, vehicle.component_id)
     log.texts = [VehicleText(t, _INFO, text) for t, text in texts] + _failures(flash)
-    log.faults = [*flash.damage.words(len(data)), *_lost(flash)]
+    log.faults = [*flash.damage.words(len(data)), *_doubts(flash)]
     log.told = [
         _position(flash),
         *_velocity(flash, gps, gps_t_s),
@@ -122,8 +123,7 @@ def gps_utc_s(gps: Rows) -> F64:
 
 def _vehicle(flash: DataFlash, texts: list[str]) -> VehicleState:
     kind, version = vehicle_words(texts)
-    parameters = flash.rows("PARM")
-    values = dict(zip(parameters.texts("Name"), parameters.column("Value").tolist(), strict=True))
+    values = parameters_of(flash)
     system_id = values.get("MAV_SYSID", values.get("SYSID_THISMAV", 1.0))
     return VehicleState(
         system_id=int(system_id) if 1 <= system_id <= 255 else 1,
@@ -136,6 +136,12 @@ def _vehicle(flash: DataFlash, texts: list[str]) -> VehicleState:
     )
 
 
+def parameters_of(flash: DataFlash) -> dict[str, float]:
+    """As they were last."""
+    rows = flash.rows("PARM")
+    return dict(zip(rows.texts("Name"), rows.column("Value").tolist(), strict=True))
+
+
 def _receiver(gps: Rows, t_s: F64) -> tuple[Rows, F64]:
     """Of several receivers the one that was flown by, at each time."""
     used = gps.column("U") == 1
@@ -144,7 +150,8 @@ def _receiver(gps: Rows, t_s: F64) -> tuple[Rows, F64]:
 
 
 def _position(flash: DataFlash) -> Told:
-    rows, t_s = timed(flash, "POS")
+    """Of the second estimator where the first is not in the log."""
+    rows, t_s = timed(flash, "POS" if len(flash.rows("POS")) else "AHR2")
     known = placed(rows.column("Lat"), rows.column("Lng"))
     rows = rows.where(known)
     fields: dict[str, Any] = {
@@ -169,7 +176,11 @@ def _velocity(flash: DataFlash, gps: Rows, gps_t_s: F64) -> list[Told]:
 
 
 def _attitude(flash: DataFlash) -> Told:
-    rows, t_s = timed(flash, "ATT")
+    """What was flown by; else of the estimator's first core, else of the second estimator."""
+    name = next((name for name in _ATTITUDES if len(flash.rows(name))), _ATTITUDES[0])
+    rows, t_s = timed(flash, name)
+    first = ~(rows.column("C") > 0)
+    rows, t_s = rows.where(first), t_s[first]
     fields: dict[str, Any] = {
         "roll_rad": np.radians(rows.column("Roll")),
         "pitch_rad": np.radians(rows.column("Pitch")),
@@ -307,7 +318,10 @@ def _failures(flash: DataFlash) -> list[VehicleText]:
     return told
 
 
-def _lost(flash: DataFlash) -> list[str]:
+def _doubts(flash: DataFlash) -> list[str]:
     dropped = flash.rows("DSF").column("Dp")
     lost = int(dropped[-1]) if len(dropped) and np.isfinite(dropped[-1]) else 0
-    return [f"The vehicle could not write {lost} records: they are missing."] if lost else []
+    said = [f"The vehicle could not write {lost} records: they are missing."] if lost else []
+    if not len(flash.rows("POS")) and len(flash.rows("AHR2")):
+        said.append("The log holds no POS: positions are those of the second estimator (AHR2).")
+    return said

@@ -52,6 +52,8 @@ _MODES = {
 }
 """vehicle_status.nav_state, as the same modes are called over MAVLink."""
 _ARMED = 2
+_SPHERE_M = 6_371_000.0
+"""CONSTANTS_RADIUS_OF_EARTH of PX4."""
 
 
 def read_ulog_flight(data: Data) -> OwnLog:
@@ -80,9 +82,9 @@ def read_ulog_flight(data: Data) -> OwnLog:
     return log
 
 
-def timed(ulog: ULog, name: str) -> tuple[Rows, F64]:
+def timed(ulog: ULog, name: str, instance: int = 0) -> tuple[Rows, F64]:
     """The records of a topic, and when each was written, in seconds since the vehicle's start."""
-    rows = ulog.rows(name)
+    rows = ulog.rows(name, instance)
     return ordered(rows, rows.column("timestamp") / 1e6)
 
 
@@ -151,21 +153,48 @@ def _home_alt_amsl_m(home: Rows) -> F64:
 
 def _position(ulog: ULog, home: Rows, home_t_s: F64) -> Told:
     """Heights above home count from home as it was then: PX4 corrects it in flight."""
-    rows, t_s = timed(ulog, _POSITION)
-    known = placed(rows.column("lat"), rows.column("lon"))
-    for flag in ("lat_lon_valid", "alt_valid"):
-        known &= ~(rows.column(flag) == 0)
-    rows, t_s = rows.where(known), t_s[known]
+    t_s, lat_deg, lon_deg, alt_m = _global_places(ulog) if len(ulog.rows(_POSITION)) else _local_places(ulog)
     at = np.searchsorted(home_t_s, t_s, side="right") - 1
     home_alt_m = _home_alt_amsl_m(home)
     below_m = unless(home_alt_m[np.maximum(at, 0)], at < 0) if len(home) else np.full(len(t_s), np.nan)
     fields: dict[str, Any] = {
-        "lat_deg": rows.column("lat"),
-        "lon_deg": rows.column("lon"),
-        "alt_amsl_m": rows.column("alt"),
-        "alt_rel_home_m": rows.column("alt") - below_m,
+        "lat_deg": lat_deg,
+        "lon_deg": lon_deg,
+        "alt_amsl_m": alt_m,
+        "alt_rel_home_m": alt_m - below_m,
     }
     return Told(t_s, fields, stamp="position_t_mono_s", exact=True)
+
+
+def _global_places(ulog: ULog) -> tuple[F64, F64, F64, F64]:
+    """Time, latitude, longitude and height above sea level, (N,) each."""
+    rows, t_s = timed(ulog, _POSITION)
+    known = placed(rows.column("lat"), rows.column("lon"))
+    for flag in ("lat_lon_valid", "alt_valid"):
+        known &= ~(rows.column(flag) == 0)
+    rows = rows.where(known)
+    return t_s[known], rows.column("lat"), rows.column("lon"), rows.column("alt")
+
+
+def _local_places(ulog: ULog) -> tuple[F64, F64, F64, F64]:
+    """As ``_global_places``, by the reference that PX4 puts its local metres around, on its sphere.
+
+    Inverse of the azimuthal equidistant projection: Snyder 1987, eqs 20-14 and 20-15.
+    """
+    rows, t_s = timed(ulog, _LOCAL)
+    known = placed(rows.column("ref_lat"), rows.column("ref_lon"))
+    for flag in ("xy_valid", "z_valid", "xy_global", "z_global"):
+        known &= rows.column(flag) == 1
+    rows = rows.where(known)
+    north, east = rows.column("x") / _SPHERE_M, rows.column("y") / _SPHERE_M
+    ref_lat, ref_lon = np.radians(rows.column("ref_lat")), np.radians(rows.column("ref_lon"))
+    c = np.hypot(north, east)
+    share = np.sinc(c / np.pi)  # sin(c) / c
+    sin_lat = np.cos(c) * np.sin(ref_lat) + north * share * np.cos(ref_lat)  # eq. 20-14
+    across = np.cos(ref_lat) * np.cos(c) - north * share * np.sin(ref_lat)
+    lon = ref_lon + np.arctan2(east * share, across)  # eq. 20-15
+    lat_deg = np.degrees(np.arcsin(np.clip(sin_lat, -1.0, 1.0)))
+    return t_s[known], lat_deg, np.degrees(lon), rows.column("ref_alt") - rows.column("z")
 
 
 def _velocity(ulog: ULog) -> Told:
