@@ -1,4 +1,4 @@
-"""What ``hedgehop map`` asks of a bag of ROS, and the recording that the bag becomes for it."""
+"""What ``hedgehop map`` asks of a bag of ROS, and the recording that a bag, or a log, becomes for it."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from typer import Option
 
 from server.cli.shared.output import progress, say_notes
 from telemetry.errors import RecordingError
+from telemetry.perception.rebuilding.log_readers import LogKind, log_kind
+from telemetry.perception.rebuilding.range_flight import write_range_flight
 from telemetry.recording.ros.bag import bag_kind, list_bag
 from telemetry.recording.ros.bag_flight import BagAsked, BagFlight, write_bag_flight
 from telemetry.recording.ros.bag_types import POINT_TYPES
@@ -44,16 +46,24 @@ class BagOptions:
 
 @contextmanager
 def as_recording(path: Path, sensor: Sensor, given: BagOptions, *, placed: str | None) -> Iterator[Path]:
-    """The path itself; of a bag, a recording that is made of it and is gone afterwards.
+    """The path itself; of a bag, or a log, a recording that is made of it and is gone afterwards.
 
     ``placed``: what must lie somewhere on Earth; None: nothing must.
     """
-    if bag_kind(path) is None:
+    is_bag = bag_kind(path) is not None
+    if not is_bag:
         refuse_for_recordings(path, given)
+    kind = None if is_bag else log_kind(path)
+    if not is_bag and kind is None:
         yield path
         return
     path = path.resolve()  # "." has no name
-    with tempfile.TemporaryDirectory(prefix="hedgehop-bag-") as folder:
+    with tempfile.TemporaryDirectory(prefix="hedgehop-map-") as folder:
+        if kind is not None:
+            out = Path(folder) / path.name  # errors say it
+            _write_log(path, kind, sensor, out)
+            yield out
+            return
         # The name is the bag's: errors say it.
         out = Path(folder) / path.with_suffix(".mcap").name
         flight = _written(path, sensor, given, out)
@@ -62,6 +72,15 @@ def as_recording(path: Path, sensor: Sensor, given: BagOptions, *, placed: str |
             advice = "Give --home-alt-amsl-m, with a NavSatFix in the bag; a .ply or .bt needs no place."
             raise RecordingError(what, where=path.name, advice=advice)
         yield out
+
+
+def _write_log(path: Path, kind: LogKind, sensor: Sensor, out: Path) -> None:
+    if sensor != "ranges":
+        what = f"A log of this kind holds single distances, and nothing of a {sensor}."
+        raise RecordingError(what, where=path.name, advice="Give --sensor ranges.")
+    progress("Reading the log", 0.0)
+    flight = write_range_flight(path, out, kind, progress=lambda share: progress("Placing distances", share))
+    say_notes(*flight.notes)
 
 
 def _written(path: Path, sensor: Sensor, given: BagOptions, out: Path) -> BagFlight:

@@ -1,4 +1,4 @@
-"""``hedgehop map``: the map of obstacles of a recording or a bag of ROS, made from what its sensors saw."""
+"""``hedgehop map``: the map of obstacles of a recording, a bag of ROS or a log, made from what its sensors saw."""
 
 from __future__ import annotations
 
@@ -36,7 +36,10 @@ class MapFileError(DescribedError):
 def build_map(
     recording: Annotated[
         Path,
-        Argument(metavar="RECORDING", help="A recording of Hedgehop (.mcap), or a bag of ROS; with --all a folder."),
+        Argument(
+            metavar="RECORDING",
+            help="A recording of Hedgehop (.mcap), a bag of ROS, or a log (.bin, .ulg, .tlog); with --all a folder.",
+        ),
     ],
     sensor: Annotated[Literal["radar", "vision", "ranges"], Option(help="Whose map.")],
     out: Annotated[
@@ -76,7 +79,7 @@ def build_map(
     bag: BagOptions = NO_BAG,
     as_json: o.AsJson = False,
 ) -> None:
-    """Build a recording's map of obstacles again, exactly as it was in flight or otherwise; or that of a bag of ROS."""
+    """Build a recording's map of obstacles again, as it was in flight or otherwise; or that of a bag or a log."""
     other = OtherMap(
         resolution_m,
         _limit_bytes(memory_mb),
