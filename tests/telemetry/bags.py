@@ -17,6 +17,13 @@ KINDS = ("ros1", "db3", "mcap")
 T0_NS = 1_700_000_000_000_000_000
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
 ROS1.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", "tf2_msgs/msg/TFMessage"))
+for _store in (ROS1, ROS2):
+    _point = "uint32 offset_time\nfloat32 x\nfloat32 y\nfloat32 z\nuint8 reflectivity\nuint8 tag\nuint8 line"
+    _sweep = (
+        "std_msgs/Header header\nuint64 timebase\nuint32 point_num\nuint8 lidar_id\nuint8[3] rsvd\nCustomPoint[] points"
+    )
+    _store.register(get_types_from_msg(_point, "livox_ros_driver2/msg/CustomPoint"))
+    _store.register(get_types_from_msg(_sweep, "livox_ros_driver2/msg/CustomMsg"))
 Entry = tuple[str, int, Any]
 """Topic, time of recording in ns, message (made by ``Messages``)."""
 
@@ -93,6 +100,22 @@ class Messages:
             "sensor_msgs/msg/LaserScan", self.header(t_ns, frame), begin_rad, 0.0, step_rad, 0.0, 0.1, 0.1, 30.0,
             ranges_m, np.zeros(0, np.float32),
         )  # fmt: skip
+
+    def livox(
+        self,
+        t_ns: int,
+        frame: str,
+        xyz: ArrayLike,
+        offsets_ns: ArrayLike,
+        *,
+        timebase: int = 0,
+        said: int | None = None,
+    ) -> Any:
+        rows = zip(np.asarray(offsets_ns, int).tolist(), np.asarray(xyz, float).tolist(), strict=True)
+        points = [self.make("livox_ros_driver2/msg/CustomPoint", ns, *place, 10, 0, 0) for ns, place in rows]
+        count = len(points) if said is None else said
+        told = (self.header(t_ns, frame), timebase, count, 0, np.zeros(3, np.uint8), points)
+        return self.make("livox_ros_driver2/msg/CustomMsg", *told)
 
     def range(self, t_ns: int, frame: str, range_m: float) -> Any:
         return self.make("sensor_msgs/msg/Range", self.header(t_ns, frame), 0, 0.1, 0.2, 40.0, range_m)

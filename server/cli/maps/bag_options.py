@@ -17,7 +17,7 @@ from telemetry.perception.rebuilding.log_readers import LogKind, log_kind
 from telemetry.perception.rebuilding.range_flight import write_range_flight
 from telemetry.recording.ros.bag import bag_kind, list_bag
 from telemetry.recording.ros.bag_flight import BagAsked, BagFlight, write_bag_flight
-from telemetry.recording.ros.bag_types import POINT_TYPES
+from telemetry.recording.ros.bag_types import BAG_POINT_TYPES
 from telemetry.recording.ros.placing import MOST_GAP_S
 from telemetry.topics.obstacles import Sensor
 
@@ -27,7 +27,9 @@ class BagOptions:
     """Options of a bag; a recording of Hedgehop has none of them."""
 
     PANEL: ClassVar = "Bags of ROS"
-    points: Annotated[str | None, Option(metavar="TOPIC", help="PointCloud2, LaserScan or Range to map.")] = None
+    points: Annotated[
+        str | None, Option(metavar="TOPIC", help="PointCloud2, LaserScan, Range or Livox's CustomMsg.")
+    ] = None
     pose: Annotated[
         str | None,
         Option(metavar="TOPIC", help="Odometry, PoseStamped, or /tf; default: the only one, else the transforms."),
@@ -86,7 +88,7 @@ def _write_log(path: Path, kind: LogKind, sensor: Sensor, out: Path) -> None:
 def _written(path: Path, sensor: Sensor, given: BagOptions, out: Path) -> BagFlight:
     table = list_bag(path, progress=lambda share: progress("Looking through the bag", share))
     if given.points is None:
-        listed = [f"{topic.name} ({topic.count:,})" for topic in table.of_types(POINT_TYPES)]
+        listed = [f"{topic.name} ({topic.count:,})" for topic in table.of_types(BAG_POINT_TYPES)]
         advice = f"Give --points: {', '.join(listed[:20])}." if listed else "It holds no topic with points."
         raise RecordingError("Which points of the bag are to be mapped?", where=path.name, advice=advice)
     asked = BagAsked(given.points, given.pose, given.frame, given.max_gap_s, given.home_alt_amsl_m)

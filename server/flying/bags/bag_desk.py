@@ -154,10 +154,10 @@ def _topic(topic: BagTopic) -> BagTopicDoc:
 
 
 def _role(kind: str) -> BagRole:
-    from telemetry.recording.ros.bag_types import FIX, POINT_TYPES, POSE_TYPES, TF_TYPES
+    from telemetry.recording.ros.bag_types import BAG_POINT_TYPES, FIX, POSE_TYPES, TF_TYPES
 
     groups: tuple[tuple[frozenset[str], BagRole], ...] = (
-        (POINT_TYPES, "points"),
+        (BAG_POINT_TYPES, "points"),
         (POSE_TYPES, "poses"),
         (TF_TYPES, "transforms"),
         (frozenset({FIX}), "fix"),
@@ -172,7 +172,9 @@ def _missing(topics: list[BagTopicDoc], fault: str) -> list[str]:
     readable = {topic.role for topic in topics if topic.messages}
     said = [f"It is damaged: nothing could be read after a place ({fault})."] if fault else []
     if "points" not in readable:
-        said.append("It holds no points (PointCloud2, LaserScan, Range): no recording can be made of it.")
+        said.append(
+            "It holds no points (PointCloud2, LaserScan, Range, Livox's CustomMsg): no recording can be made of it."
+        )
     if not readable & {"poses", "transforms"}:
         said.append("It holds neither poses nor transforms: nothing tells where the robot was.")
     elif "transforms" not in readable:

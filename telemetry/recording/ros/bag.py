@@ -78,6 +78,8 @@ class BagContents:
     broken: int
     """Messages that contradict themselves."""
     first_broken: str
+    other_clock: int = 0
+    """Messages whose sensor's own clock tells another time than their header."""
 
 
 def bag_kind(path: Path) -> BagKind | None:
@@ -150,6 +152,7 @@ def contents_of(directory: Path, found: dict[str, Any]) -> BagContents:
         without_place=counts.get("without_place", 0),
         broken=counts.get("broken", 0),
         first_broken=found["broken"],
+        other_clock=counts.get("other_clock", 0),
     )
 
 

@@ -16,7 +16,7 @@ from telemetry.errors import RecordingError
 from telemetry.recording.mcap_files.writer import RecordingWriter
 from telemetry.recording.placed_state import attitude_of, state_at
 from telemetry.recording.ros.bag import BagContents, BagTable, Progress, read_bag
-from telemetry.recording.ros.bag_types import POINT_TYPES, POSE_TYPES, TF_TYPES
+from telemetry.recording.ros.bag_types import BAG_POINT_TYPES, POSE_TYPES, TF_TYPES
 from telemetry.recording.ros.placing import MOST_GAP_S, PlacedBag, PlacedCloud, PlacedPose, placed
 from telemetry.topics.messages import Topic
 from telemetry.topics.obstacles import PerceptionSettings, Sensor
@@ -77,7 +77,7 @@ def write_bag_flight(
     """
     if not (math.isfinite(asked.most_gap_s) and asked.most_gap_s > 0.0):
         raise RecordingError(f"A gap of {asked.most_gap_s:g} s is none.", where="--max-gap-s", advice="Try 0.5.")
-    _check_topic(table, asked.points, POINT_TYPES, "points", path.name)
+    _check_topic(table, asked.points, BAG_POINT_TYPES, "points", path.name)
     pose = _pose_topic(table, asked.pose, path.name)
     contents = read_bag(path, table, points=asked.points, pose=pose, progress=progress)
     try:

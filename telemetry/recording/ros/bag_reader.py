@@ -14,7 +14,8 @@ from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_
 from ruamel.yaml import YAML
 
 from telemetry.errors import RecordingError
-from telemetry.recording.ros.bag_types import LONGEST_NAME, MOST_TOPICS
+from telemetry.recording.ros.bag_types import LIVOX_TYPES, LONGEST_NAME, MOST_TOPICS
+from telemetry.recording.ros.livox_messages import MESSAGE_DEFINITION, POINT_DEFINITION
 
 _STANDARD = {True: Stores.ROS1_NOETIC, False: Stores.ROS2_HUMBLE}
 """Of bags that carry no definitions."""
@@ -57,7 +58,10 @@ class OpenBag:
         store, own = get_typestore(_STANDARD[self._is_ros1]), dict[str, Any]()
         for connection in self.connections:
             definition = connection.msgdef
-            if connection.topic not in topics or definition.format == MessageDefinitionFormat.NONE:
+            if connection.topic not in topics:
+                continue
+            if definition.format == MessageDefinitionFormat.NONE:
+                own |= _livox_types(connection.msgtype) if connection.msgtype in LIVOX_TYPES else {}
                 continue
             is_idl = definition.format == MessageDefinitionFormat.IDL
             own |= (
@@ -71,6 +75,11 @@ class OpenBag:
         typestore = get_typestore(Stores.EMPTY)
         typestore.register({**(store.fielddefs if not wanted <= own.keys() else {}), **own})
         return typestore
+
+
+def _livox_types(name: str) -> dict[str, Any]:
+    point = name.replace("CustomMsg", "CustomPoint")
+    return {**get_types_from_msg(POINT_DEFINITION, point), **get_types_from_msg(MESSAGE_DEFINITION, name)}
 
 
 @contextmanager

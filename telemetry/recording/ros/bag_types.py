@@ -9,6 +9,11 @@ import numpy as np
 
 CLOUD, SCAN, RANGE = "sensor_msgs/msg/PointCloud2", "sensor_msgs/msg/LaserScan", "sensor_msgs/msg/Range"
 POINT_TYPES = frozenset({CLOUD, SCAN, RANGE})
+LIVOX_TYPES = frozenset(
+    f"{name}/msg/CustomMsg" for name in ("livox_ros_driver2", "livox_ros_driver", "livox_interfaces")
+)
+BAG_POINT_TYPES = POINT_TYPES | LIVOX_TYPES
+"""Of bags; live topics are read of ``POINT_TYPES``."""
 ODOMETRY, POSE = "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped"
 POSE_COVARIANCE = "geometry_msgs/msg/PoseWithCovarianceStamped"
 TF, OLD_TF = "tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"
@@ -17,7 +22,7 @@ POSE_TYPES = frozenset({ODOMETRY, POSE, POSE_COVARIANCE})
 FIX = "sensor_msgs/msg/NavSatFix"
 OTHER_TYPES = frozenset({"sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Imu"})
 """Named in the table, and not decoded."""
-KNOWN_TYPES = POINT_TYPES | POSE_TYPES | TF_TYPES | OTHER_TYPES | {FIX}
+KNOWN_TYPES = BAG_POINT_TYPES | POSE_TYPES | TF_TYPES | OTHER_TYPES | {FIX}
 
 MOST_TOPICS, MOST_NAMES, LONGEST_NAME = 1000, 1000, 256
 MOST_POINTS, MOST_ROWS = 50_000_000, 5_000_000

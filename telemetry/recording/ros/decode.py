@@ -16,8 +16,10 @@ import numpy as np
 from telemetry.errors import RecordingError
 from telemetry.recording.ros.bag_reader import OpenBag, open_bag
 from telemetry.recording.ros.bag_types import (
+    BAG_POINT_TYPES,
     FIX,
     FRAME,
+    LIVOX_TYPES,
     LONGEST_NAME,
     MOST_BYTES,
     MOST_LAT_DEG,
@@ -26,11 +28,11 @@ from telemetry.recording.ros.bag_types import (
     MOST_POINTS,
     MOST_ROWS,
     PLACE,
-    POINT_TYPES,
     TABLES,
     TF_TYPES,
     TRANSFORM,
 )
+from telemetry.recording.ros.livox_messages import has_other_clock, slices_of
 from telemetry.recording.ros.point_messages import MalformedMessageError, points_of
 from telemetry.recording.ros.pose_messages import PoseFound, frame_name, pose_of, stamp_ns_of, transform_of
 
@@ -137,8 +139,10 @@ class _Sorter:
         if kind in TF_TYPES:
             for each in message.transforms:
                 self._transform("transforms", self._stamp(each.header, t_ns), transform_of(each), topic)
-        elif topic == self._points and kind in POINT_TYPES:
-            self._frame(self._stamp(message.header, t_ns), message, kind)
+        elif topic == self._points and kind in LIVOX_TYPES:
+            self._sweep(self._stamp(message.header, t_ns), message)
+        elif topic == self._points and kind in BAG_POINT_TYPES:
+            self._frame(self._stamp(message.header, t_ns), *points_of(message, kind), message)
         elif topic == self._pose:
             self._transform("poses", self._stamp(message.header, t_ns), pose_of(message, kind), topic)
         elif kind == FIX and int(message.status.status) >= 0:
@@ -148,8 +152,13 @@ class _Sorter:
             if all(map(math.isfinite, place)):
                 self._put("places", np.array([(self._stamp(message.header, t_ns), *place)], PLACE))
 
-    def _frame(self, stamp_ns: int, message: Any, kind: str) -> None:
-        found, without_place = points_of(message, kind)
+    def _sweep(self, stamp_ns: int, message: Any) -> None:
+        slices, without_place = slices_of(message)
+        self.counts["other_clock"] += has_other_clock(message, stamp_ns)
+        for number, (after_ns, found) in enumerate(slices):
+            self._frame(stamp_ns + after_ns, found, 0 if number else without_place, message)
+
+    def _frame(self, stamp_ns: int, found: np.ndarray[Any, Any], without_place: int, message: Any) -> None:
         name = self._name(message.header.frame_id)
         self.counts["without_place"] += without_place
         first = self._rows["points"]

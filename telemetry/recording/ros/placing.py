@@ -205,6 +205,11 @@ def _notes(contents: BagContents, robot: _Robot, gaps: Counter[Gap], start_ns: i
         yield f"{count:,} of {of:,} clouds were left out: {_words(gap, start_ns)}. {advice}"
     if contents.unstamped:
         yield f"{contents.unstamped:,} messages have no time of their own: when they were recorded stands for it."
+    if contents.other_clock:
+        yield (
+            f"{contents.other_clock:,} messages have a sensor's clock (timebase) over 1 s away from their header: the "
+            "header counts, which must be of the clock of the poses."
+        )
     if contents.without_place:
         yield f"{contents.without_place:,} points were no numbers and were left out."
     if contents.broken:
