@@ -7,11 +7,11 @@ import { whyNotCommand } from "../store/reach";
 import { document_ } from "../store/state";
 import { Button, Segmented } from "../ui/Button";
 import { HoldButton } from "../ui/HoldButton";
-import { Icon } from "../ui/Icon";
 import { NumberField } from "../ui/NumberField";
 import { Done } from "../ui/Outcome";
 import { Section } from "../ui/Section";
 import { aimsFor } from "../vehicle/aiming";
+import { WayReasons, WayVerdict } from "./WayVerdict";
 import {
   GUIDED,
   action,
@@ -206,23 +206,14 @@ function Way({ way }: { way: WayDoc }) {
       data-testid="way-card"
       data-problem={way.problem ?? "none"}
     >
-      <strong class="way-verdict">
-        <Icon name={isClear ? "check" : "warning"} size={16} /> {VERDICTS[way.problem ?? "none"]}
-        <span class="muted">{TITLES[way.action]}</span>
-      </strong>
+      <WayVerdict icon={isClear ? "check" : "warning"} words={VERDICTS[way.problem ?? "none"]}>
+        {TITLES[way.action]}
+      </WayVerdict>
       <Facts way={way} />
       {way.notes.map((note) => (
         <p key={note}>{note}</p>
       ))}
-      {way.reasons.length > 0 && (
-        <ul class="way-reasons" data-testid="way-reasons">
-          {way.reasons.map(({ code, text, mend }) => (
-            <li key={code}>
-              {text} {mend && <span class="muted">{mend}</span>}
-            </li>
-          ))}
-        </ul>
-      )}
+      {way.reasons.length > 0 && <WayReasons reasons={way.reasons} testid="way-reasons" />}
       <p class="muted">
         Over {way.terrain_name}
         {way.has_seen ? ", with what was seen" : ""}. It then {way.lands ? "lands" : "holds"}.

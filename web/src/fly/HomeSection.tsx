@@ -9,12 +9,12 @@ import { whyNotCommand } from "../store/reach";
 import { document_ } from "../store/state";
 import { Button } from "../ui/Button";
 import { HoldButton } from "../ui/HoldButton";
-import { Icon } from "../ui/Icon";
 import { Done } from "../ui/Outcome";
 import { Section } from "../ui/Section";
 import { aimsFor } from "../vehicle/aiming";
 import { HOME, aimAtHome, askHome, putHomeAway, setHome, takeAnswer } from "../vehicle/home_orders";
 import { returnAge_s, returnWords } from "../vehicle/return_words";
+import { WayReasons, WayVerdict } from "./WayVerdict";
 
 /** The vehicle's own return: clear by how much, or what is in the way. */
 function Return({ ret, isAnew = false }: { ret: ReturnDoc; isAnew?: boolean }) {
@@ -26,21 +26,10 @@ function Return({ ret, isAnew = false }: { ret: ReturnDoc; isAnew?: boolean }) {
       data-testid="return-verdict"
       data-state={ret.state}
     >
-      <strong class="way-verdict">
-        <Icon name={isClear ? "check" : "warning"} size={16} /> {returnWords(ret.state)}
-        <span class="muted">{isAnew ? "judging…" : age_s === null ? "" : `${duration(age_s)} ago`}</span>
-      </strong>
-      {isClear ? (
-        <p>Clear by {clearance(ret.clearance_m ?? null)}.</p>
-      ) : (
-        <ul class="way-reasons">
-          {ret.reasons.map(({ code, text, mend }) => (
-            <li key={code}>
-              {text} {mend && <span class="muted">{mend}</span>}
-            </li>
-          ))}
-        </ul>
-      )}
+      <WayVerdict icon={isClear ? "check" : "warning"} words={returnWords(ret.state)}>
+        {isAnew ? "judging…" : age_s === null ? "" : `${duration(age_s)} ago`}
+      </WayVerdict>
+      {isClear ? <p>Clear by {clearance(ret.clearance_m ?? null)}.</p> : <WayReasons reasons={ret.reasons} />}
       {ret.instead && <p>A way home is certified: Guided flight, Home.</p>}
     </div>
   );
@@ -60,12 +49,9 @@ function Asked({ asked }: { asked: HomeAskedDoc }) {
     rises_m < 0.05 ? "as high" : `${metres(rises_m, 1)} ${asked.rises_m > 0 ? "higher" : "lower"}`;
   return (
     <div ref={card} class="way-card home-card" role="group" aria-label="Home" data-testid="home-card">
-      <strong class="way-verdict">
-        <Icon name="home" size={16} /> {asked.is_here ? "Home here" : "Home there"}
-        <span class="muted">
-          {metres(asked.moves_m, 0)} from home, {height}
-        </span>
-      </strong>
+      <WayVerdict icon="home" words={asked.is_here ? "Home here" : "Home there"}>
+        {metres(asked.moves_m, 0)} from home, {height}
+      </WayVerdict>
       {asked.changes.map((change) => (
         <p key={change}>{change}</p>
       ))}

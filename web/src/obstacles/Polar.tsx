@@ -19,7 +19,7 @@ import {
   type Shown,
 } from "./PolarLayers";
 import { SensorMark } from "./SensorMark";
-import { nearestOf, nextRange } from "./polar";
+import { nearestOf, nextRange, rings } from "./polar";
 import { SENSOR_WORDS, distance, offNose } from "./obstacle_words";
 
 function words(all: readonly Shown[]): string {
@@ -78,13 +78,13 @@ function Keys({ all }: { all: readonly Shown[] }) {
   );
 }
 
-interface Props {
+export interface DisplayProps {
   source: Source;
   state: VehicleState | null;
 }
 
 /** What is around, seen from above with the nose up: regions, nearest voxels, obstacles with their height. */
-export function Polar({ source, state }: Props) {
+export function Polar({ source, state }: DisplayProps) {
   const known = sensed[source].value;
   if (known.size === 0) return null;
   const range_m = polarRange_m.value;
@@ -105,7 +105,7 @@ export function Polar({ source, state }: Props) {
         data-testid="polar"
         data-range={range_m}
       >
-        <Rings range_m={range_m} />
+        <Rings values={rings(range_m)} unit="m" />
         {all.map((shown) => (
           <Sector key={shown.sensor} shown={shown} range_m={range_m} />
         ))}

@@ -1,8 +1,8 @@
-import { degreesOf, metres, number } from "../format";
+import { degreesOf, number, withUnit } from "../format";
 import type { SensorName } from "../store/obstacles";
 import type { Sensed } from "../store/sensing";
 import { SHAPES } from "./SensorMark";
-import { RADIUS, blips, labelled, place, rings, sector, sweepArcs } from "./polar";
+import { RADIUS, blips, labelled, place, sector, sweepArcs } from "./polar";
 import { signedHeight } from "./obstacle_words";
 
 /** What the polar display draws, from below to above. */
@@ -19,19 +19,21 @@ export interface Shown {
   isWatching: boolean;
 }
 
-export function Rings({ range_m }: { range_m: number }) {
+/** Rings around own ship; the last value is the rim's, every second one is written. */
+export function Rings({ values, unit }: { values: readonly number[]; unit: string }) {
+  const rim = values[values.length - 1]!;
   return (
     <g class="polar-rings">
-      {rings(range_m).map((ring_m, index, all) => {
-        const radius = (ring_m / range_m) * RADIUS;
+      {values.map((value, index) => {
+        const radius = (value / rim) * RADIUS;
         const { x, y } = place(LABELS_AT_DEG, radius - 9);
-        const isLast = index === all.length - 1;
+        const isLast = index === values.length - 1;
         return (
-          <g key={ring_m}>
-            <circle r={radius} class={isLast ? "rim" : ""} />
+          <g key={value}>
+            <circle r={radius.toFixed(1)} class={isLast ? "rim" : ""} />
             {(isLast || index % 2 === 1) && (
               <text x={x.toFixed(1)} y={(y + 4).toFixed(1)}>
-                {isLast ? metres(ring_m, 0) : number(ring_m)}
+                {isLast ? withUnit(value, unit) : number(value)}
               </text>
             )}
           </g>

@@ -2,6 +2,7 @@ import { signal } from "@preact/signals";
 import { useState } from "preact/hooks";
 import { count, day } from "../format";
 import type { PlanEntry } from "../messages";
+import { ActionTable } from "../ui/ActionTable";
 import { Button } from "../ui/Button";
 import { Changes } from "../ui/Changes";
 import { Dialog } from "../ui/Dialog";
@@ -83,25 +84,19 @@ export function PlansDialog() {
         </Changes>
         <span class="muted">{count(plans.length, "plan")}; each saves itself</span>
       </div>
-      <div class="table-scroll">
-        <table class="plans">
-          <thead>
-            <tr>
-              <th scope="col">Name</th>
-              <th scope="col">Terrain</th>
-              <th scope="col">Saved</th>
-              <th>
-                <span class="visually-hidden">Actions</span>
-              </th>
-            </tr>
-          </thead>
-          <tbody>
-            {plans.map((entry) => (
-              <PlanRow key={entry.id} entry={entry} />
-            ))}
-          </tbody>
-        </table>
-      </div>
+      <ActionTable
+        head={
+          <>
+            <th scope="col">Name</th>
+            <th scope="col">Terrain</th>
+            <th scope="col">Saved</th>
+          </>
+        }
+      >
+        {plans.map((entry) => (
+          <PlanRow key={entry.id} entry={entry} />
+        ))}
+      </ActionTable>
     </Dialog>
   );
 }

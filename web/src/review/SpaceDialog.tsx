@@ -5,6 +5,7 @@ import { recorder } from "../store/flying";
 import { pending } from "../store/outcomes";
 import { RECORDINGS, deleteRecording, recordings, review } from "../store/review";
 import { openDialog } from "../store/view";
+import { ActionTable } from "../ui/ActionTable";
 import { Button } from "../ui/Button";
 import { Changes } from "../ui/Changes";
 import { DeleteForGood } from "../ui/DeleteForGood";
@@ -100,27 +101,23 @@ export function SpaceDialog() {
       {all.length === 0 ? (
         <p>No recording is left to be deleted: remove other files from the disk of the data directory.</p>
       ) : (
-        <div class="table-scroll" tabIndex={0}>
-          <table class="plans space">
-            <thead>
-              <tr>
-                <Head by="date" label="Date" />
-                <th scope="col" class="optional">
-                  Length
-                </th>
-                <Head by="size" label="Size" />
-                <th>
-                  <span class="visually-hidden">Actions</span>
-                </th>
-              </tr>
-            </thead>
-            <tbody>
-              {[...all].sort(BY[order.value]).map((recording) => (
-                <Row key={recording.id} recording={recording} />
-              ))}
-            </tbody>
-          </table>
-        </div>
+        <ActionTable
+          class="space"
+          isReached
+          head={
+            <>
+              <Head by="date" label="Date" />
+              <th scope="col" class="optional">
+                Length
+              </th>
+              <Head by="size" label="Size" />
+            </>
+          }
+        >
+          {[...all].sort(BY[order.value]).map((recording) => (
+            <Row key={recording.id} recording={recording} />
+          ))}
+        </ActionTable>
       )}
     </Dialog>
   );

@@ -1,5 +1,4 @@
-import type { VehicleState } from "../messages";
-import { Polar } from "../obstacles/Polar";
+import { Polar, type DisplayProps } from "../obstacles/Polar";
 import type { Source } from "../store/flying";
 import { hasSensors } from "../store/obstacles";
 import { hasTracks, isEndangered } from "../store/moving";
@@ -49,13 +48,8 @@ function Tabs({ source }: { source: Source }) {
   );
 }
 
-interface Props {
-  source: Source;
-  state: VehicleState | null;
-}
-
 /** What is around, and which velocities lead into it: side by side where there is room, else one at a time. */
-export function Displays({ source, state }: Props) {
+export function Displays({ source, state }: DisplayProps) {
   const polar = <Polar source={source} state={state} />;
   // Live their place is kept from the first sensor on: nothing moves when tracks come.
   if (!hasTracks[source].value && (source === "replay" || !hasSensors.live.value)) return polar;

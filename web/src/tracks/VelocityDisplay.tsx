@@ -1,12 +1,12 @@
 import { DASH, degreesOf } from "../format";
-import type { TracksStatus, VehicleState } from "../messages";
-import { HALF_HEIGHT, HALF_WIDTH, North } from "../obstacles/PolarLayers";
+import type { TracksStatus } from "../messages";
+import type { DisplayProps } from "../obstacles/Polar";
+import { HALF_HEIGHT, HALF_WIDTH, North, Rings } from "../obstacles/PolarLayers";
 import { RADIUS } from "../obstacles/polar";
 import { now_ms } from "../store/clock";
-import type { Source } from "../store/flying";
 import { movingWatch, moving } from "../store/moving";
-import { CLIP, ConeNames, Cones, LimitRing, Now, Proposed, SpeedRings } from "./VelocityLayers";
-import { rimOf, speed_m_s } from "./velocity";
+import { CLIP, ConeNames, Cones, LimitRing, Now, Proposed } from "./VelocityLayers";
+import { rimOf, speed_m_s, speedRings } from "./velocity";
 import { displayWords, headline, speed } from "./track_words";
 
 type ArrowKind = "now" | "proposed";
@@ -49,16 +49,11 @@ function Keys() {
 const speedOf = (velocity: TracksStatus["velocity_enu_m_s"]) =>
   velocity === null ? DASH : speed(speed_m_s(velocity));
 
-interface Props {
-  source: Source;
-  state: VehicleState | null;
-}
-
 /**
  * All velocities that the vehicle could have, the nose up: those that lead into a moving object, the one that it has,
  * and the nearest one that leads into nothing.
  */
-export function VelocityDisplay({ source, state }: Props) {
+export function VelocityDisplay({ source, state }: DisplayProps) {
   const known = moving[source].value;
   if (!known) return null;
   const { status } = known;
@@ -85,7 +80,7 @@ export function VelocityDisplay({ source, state }: Props) {
           <circle r={RADIUS} />
         </clipPath>
         <Cones cones={status.cones} own={own} scale={scale} />
-        <SpeedRings rim_m_s={scale.rim_m_s} />
+        <Rings values={speedRings(scale.rim_m_s)} unit="m/s" />
         <LimitRing limit_m_s={status.max_speed_m_s} rim_m_s={scale.rim_m_s} />
         <North heading_rad={state?.heading_rad ?? 0} />
         <ConeNames cones={status.cones} scale={scale} />

@@ -1,45 +1,11 @@
-import { number, withUnit } from "../format";
-import { RADIUS, place } from "../obstacles/polar";
+import { RADIUS } from "../obstacles/polar";
 import type { VelocityCone } from "../messages";
-import {
-  conePath,
-  conePlace,
-  leadsInto,
-  speedRings,
-  tipOf,
-  velocityPlace,
-  type Scale,
-  type Velocity,
-} from "./velocity";
+import { conePath, conePlace, leadsInto, tipOf, velocityPlace, type Scale, type Velocity } from "./velocity";
 import { trackName } from "./track_words";
 
 /** What the velocity display draws, from below to above. */
 
-const LABELS_AT_DEG = 140;
 export const CLIP = "velocity-disc";
-
-export function SpeedRings({ rim_m_s }: { rim_m_s: number }) {
-  return (
-    <g class="polar-rings">
-      {speedRings(rim_m_s).map((ring_m_s, index, all) => {
-        const radius = (ring_m_s / rim_m_s) * RADIUS;
-        const isLast = index === all.length - 1;
-        const { x, y } = place(LABELS_AT_DEG, radius - 9);
-        return (
-          <g key={ring_m_s}>
-            <circle r={radius.toFixed(1)} class={isLast ? "rim" : ""} />
-            {(isLast || index % 2 === 1) && (
-              <text x={x.toFixed(1)} y={(y + 4).toFixed(1)}>
-                {isLast ? withUnit(ring_m_s, "m/s") : number(ring_m_s)}
-              </text>
-            )}
-          </g>
-        );
-      })}
-      <path d={`M0 ${-RADIUS}V${RADIUS}M${-RADIUS} 0H${RADIUS}`} />
-    </g>
-  );
-}
 
 /** The vehicle flies no faster than this. */
 export function LimitRing({ limit_m_s, rim_m_s }: { limit_m_s: number; rim_m_s: number }) {

@@ -20,6 +20,7 @@ import { selection } from "../../store/state";
 import { setSelection } from "../../store/stream";
 import { drawer } from "../../store/view";
 import { download } from "../../store/downloads";
+import { ClickTools } from "./ClickTools";
 
 const TOOLS = [
   { tool: "fence_polygon", icon: "polygon", label: "Polygon", title: "Add corners of a polygon on click" },
@@ -44,27 +45,6 @@ const KINDS = [
 function take(tool: (typeof TOOLS)[number]["tool"]): void {
   setSelection({ tool, fence_mark: null, poi_id: null, draft: [] });
   drawer.value = null;
-}
-
-function Tools({ plan }: { plan: PlanDoc }) {
-  return (
-    <div class="tools" role="group" aria-label="What clicks on the surface draw">
-      {TOOLS.map(({ tool, icon, label, title }) => (
-        <button
-          type="button"
-          key={tool}
-          title={plan.terrain_id ? title : "Choose a terrain first"}
-          disabled={!plan.terrain_id}
-          aria-pressed={selection.value.tool === tool}
-          data-testid={`tool-${tool}`}
-          onClick={() => take(tool)}
-        >
-          <Icon name={icon} />
-          {label}
-        </button>
-      ))}
-    </div>
-  );
 }
 
 /** One shape or rally point: a press selects it, in the 3D view too. */
@@ -273,7 +253,12 @@ export function FenceSection({ plan }: { plan: PlanDoc }) {
   const isEmpty = summaryOf(plan) === "none";
   return (
     <Section id="fence" title="Fence" icon="shield" summary={summaryOf(plan)}>
-      <Tools plan={plan} />
+      <ClickTools
+        label="What clicks on the surface draw"
+        tools={TOOLS}
+        hasTerrain={Boolean(plan.terrain_id)}
+        onTake={take}
+      />
       {isEmpty && <p class="teach">Choose Polygon or Circle and click the surface, or import a file.</p>}
       <ul class="fence-list">
         {fence.polygons.map((shape, index) => (

@@ -1,7 +1,6 @@
 import { count, latLon, number } from "../../format";
 import type { PlanDoc } from "../../messages";
 import { Button, Segmented } from "../../ui/Button";
-import { Icon, type IconName } from "../../ui/Icon";
 import { Section } from "../../ui/Section";
 import { TextField } from "../../ui/fields";
 import { chooseFiles } from "../../ui/choose_files";
@@ -9,15 +8,16 @@ import { drawer } from "../../store/view";
 import { sendPoints } from "../../store/files";
 import { parsePlace } from "../../store/poi";
 import { edit } from "../../store/plan";
-import { selection, setError } from "../../store/state";
+import { setError } from "../../store/state";
 import { setSelection } from "../../store/stream";
 import { shortestOrder } from "../../store/plans";
+import { ClickTools, type ClickTool } from "./ClickTools";
 import { PoiList } from "./PoiList";
 import { SurveyFields } from "./Survey";
 
 type Tool = "select" | "add_poi" | "polygon" | "home";
 
-const TOOLS: Record<Tool, { icon: IconName; label: string; title: string }> = {
+const TOOLS: Record<Tool, Omit<ClickTool<Tool>, "tool">> = {
   select: { icon: "select", label: "Select", title: "Select and drag points (Esc)" },
   add_poi: { icon: "pin", label: "Add", title: "Add points on click (A)" },
   polygon: { icon: "polygon", label: "Corners", title: "Add corners of the survey polygon on click" },
@@ -33,25 +33,12 @@ function take(tool: Tool): void {
 function Tools({ plan }: { plan: PlanDoc }) {
   const tools: Tool[] = ["select", plan.source === "survey" ? "polygon" : "add_poi", "home"];
   return (
-    <div class="tools" role="group" aria-label="Tool for clicks on the surface">
-      {tools.map((tool) => {
-        const { icon, label, title } = TOOLS[tool];
-        return (
-          <button
-            type="button"
-            key={tool}
-            title={plan.terrain_id ? title : "Choose a terrain first"}
-            disabled={!plan.terrain_id}
-            aria-pressed={selection.value.tool === tool}
-            data-testid={`tool-${tool}`}
-            onClick={() => take(tool)}
-          >
-            <Icon name={icon} />
-            {label}
-          </button>
-        );
-      })}
-    </div>
+    <ClickTools
+      label="Tool for clicks on the surface"
+      tools={tools.map((tool) => ({ tool, ...TOOLS[tool] }))}
+      hasTerrain={Boolean(plan.terrain_id)}
+      onTake={take}
+    />
   );
 }
 
