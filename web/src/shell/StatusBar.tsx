@@ -1,6 +1,7 @@
 import { withUnit } from "../format";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
+import { matching } from "../ui/media";
 import { theme } from "../store/prefs";
 import { me, whyObserver } from "../store/flying";
 import { late_s } from "../store/reach";
@@ -36,13 +37,18 @@ const LINK_WORDS = {
   lost: "No connection – retrying",
 } as const;
 
+/** Where there is little room its dot alone tells of a good line; on a phone of any: the strip below has the words. */
+const isTight = matching("(max-width: 1240px)");
+const isPhone = matching("(max-width: 720px)");
+
 function LinkBadge() {
   const state = late_s.value === null ? link.value : "slow";
   const text = late_s.value === null ? LINK_WORDS[link.value] : `Page ${withUnit(late_s.value, "s")} late`;
+  const isTucked = isPhone.value || (isTight.value && state === "open");
   return (
     <span class={`link-badge ${state}`} role="status" data-testid="link-state">
       <span class="dot" aria-hidden="true" />
-      <span class="link-text">{text}</span>
+      <span class={isTucked ? "visually-hidden" : ""}>{text}</span>
     </span>
   );
 }
