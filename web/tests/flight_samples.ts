@@ -1,4 +1,12 @@
-import type { FlyState, FollowDoc, LinkStatus, VehicleMessage, VehicleState } from "../src/messages";
+import type { Facts } from "../src/fly/next_step";
+import type {
+  FlightStatus,
+  FlyState,
+  FollowDoc,
+  LinkStatus,
+  VehicleMessage,
+  VehicleState,
+} from "../src/messages";
 
 /** A small flight for the tests. */
 
@@ -78,3 +86,19 @@ export function flyState(fields: Partial<FlyState> = {}): FlyState {
     ...fields,
   };
 }
+
+/** What the next step is told from: connected on the ground, nothing done yet. */
+export const facts = (fields: Partial<Facts> = {}): Facts => ({
+  link: linkStatus(),
+  vehicle: vehicleState({ armed: false, landed: "on_ground" }),
+  flight: { phase: "idle" } as FlightStatus,
+  fly: flyState(),
+  transfer: null,
+  inAir: false,
+  mine: true,
+  accepted: new Set(),
+  othersAccepted: false,
+  check_age_s: 0,
+  obstacle: null,
+  ...fields,
+});

@@ -1,6 +1,6 @@
 import { beforeEach, describe, expect, it, vi } from "vitest";
 import type { PlanDoc, SelectionDoc } from "../src/messages";
-import { document_, errors, selection } from "../src/store/state";
+import { NOTHING_SELECTED, document_, errors, selection } from "../src/store/state";
 
 /** The page asks the server for landing sites; here a note of what it asked is its only answer. */
 const asked: { path: string; body: unknown }[] = [];
@@ -17,16 +17,7 @@ const { aim, findSites, pointOut, rotorSpan_m, span_m } = await import("../src/t
 const { places } = await import("../src/traversability/places");
 
 const PLACE = { lat_deg: 37.73, lon_deg: 14.99 };
-const told = (fields: Partial<SelectionDoc>) =>
-  (selection.value = {
-    tool: "select",
-    poi_id: null,
-    fence_mark: null,
-    draft: [],
-    place: null,
-    site_rank: null,
-    ...fields,
-  });
+const told = (fields: Partial<SelectionDoc>) => (selection.value = { ...NOTHING_SELECTED, ...fields });
 
 beforeEach(() => {
   told({});

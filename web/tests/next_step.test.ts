@@ -1,5 +1,5 @@
 import { describe, expect, it } from "vitest";
-import { nextStep, wordsBeside, type Facts } from "../src/fly/next_step";
+import { nextStep, wordsBeside } from "../src/fly/next_step";
 import { uploadObstacle } from "../src/vehicle/orders";
 import type {
   CheckRow,
@@ -9,22 +9,7 @@ import type {
   TakenUpDoc,
   TransferStatus,
 } from "../src/messages";
-import { flyState, linkStatus, vehicleState } from "./flight_samples";
-
-const facts = (fields: Partial<Facts> = {}): Facts => ({
-  link: linkStatus(),
-  vehicle: vehicleState({ armed: false, landed: "on_ground" }),
-  flight: { phase: "idle" } as FlightStatus,
-  fly: flyState(),
-  transfer: null,
-  inAir: false,
-  mine: true,
-  accepted: new Set(),
-  othersAccepted: false,
-  check_age_s: 0,
-  obstacle: null,
-  ...fields,
-});
+import { facts, flyState, linkStatus, vehicleState } from "./flight_samples";
 
 const onboard = (fields: Partial<OnboardDoc> = {}): OnboardDoc =>
   ({ ...flyState().onboard, state: "verified", digest: "d", is_open_plan: true, ...fields }) as OnboardDoc;

@@ -1,7 +1,7 @@
 import { beforeEach, describe, expect, it } from "vitest";
 import type { ViewDoc } from "../src/messages";
 import { forgetAsked, nextChange, takeAnswer, takeSelection, takeView } from "../src/store/shared";
-import { selection, view } from "../src/store/state";
+import { NOTHING_SELECTED, selection, view } from "../src/store/state";
 
 const shown = (fields: Partial<ViewDoc>): ViewDoc => ({ ...view.value, ...fields });
 
@@ -39,14 +39,7 @@ describe("what all pages show together", () => {
 
   it("loses nothing that others changed meanwhile", () => {
     const change = nextChange();
-    takeSelection({
-      tool: "polygon",
-      poi_id: null,
-      fence_mark: null,
-      draft: [],
-      place: null,
-      site_rank: null,
-    });
+    takeSelection({ ...NOTHING_SELECTED, tool: "polygon" });
     takeView(shown({ show_path: false }));
     takeAnswer(change);
     expect([view.value.show_path, selection.value.tool]).toEqual([false, "polygon"]);

@@ -1,5 +1,5 @@
 import type { Track, TracksMessage, TracksStatus, TraversabilityState, VelocityCone } from "../src/messages";
-import { NO_RADAR } from "../src/store/traversability";
+import { NO_GROUND } from "../src/store/traversability";
 
 /** A few moving objects and maps of ground for the tests. */
 
@@ -64,24 +64,14 @@ export const tracksMessage = (
 ): TracksMessage => ({ v: 1, type: "tracks", source, now_mono_s: 100.1, status });
 
 export const ground = (fields: Partial<TraversabilityState> = {}): TraversabilityState => ({
+  ...NO_GROUND,
   state: "ready",
   text: "84 % can be driven on.",
-  error: null,
   terrain_id: "t",
   resolution_m: 0.3,
   cells: 20000,
   untraversable: 3000,
-  cleared: 0,
-  seen: 0,
-  uwb_log: "",
-  uwb_rule: "",
-  uwb_left_out: "",
-  scans: 0,
   legend: ["Hard", "Untraversable"],
   legend_colors: ["#a696d6", "#3a1c78"],
-  sites_near: null,
-  sites: [],
-  no_site: "",
-  live: NO_RADAR,
   ...fields,
 });

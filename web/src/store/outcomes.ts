@@ -117,10 +117,10 @@ function goodUntil(path: string): Record<string, string> {
     : { "Hedgehop-Good-Until": (now_s + GOOD_FOR_S).toFixed(3) };
 }
 
-/** A request without an answer to keep; its error appears at `place`. */
-export async function act(method: string, path: string, place: string): Promise<boolean> {
+/** Whether what is asked of the server is done; its error appears at `place`. */
+export async function isDone(place: string, asked: () => Promise<unknown>): Promise<boolean> {
   try {
-    await request(method, path);
+    await asked();
     setError(place, null);
     return true;
   } catch (error) {
@@ -128,3 +128,7 @@ export async function act(method: string, path: string, place: string): Promise<
     return false;
   }
 }
+
+/** A request without an answer to keep; its error appears at `place`. */
+export const act = (method: string, path: string, place: string) =>
+  isDone(place, () => request(method, path));

@@ -2,6 +2,7 @@ import type { PlanDoc, PlanState } from "../messages";
 import { ApiError, asErrorDoc, requestJson } from "../net/api";
 import { EditQueue, type Edit } from "./edits";
 import { isObserver } from "./flying";
+import { isDone } from "./outcomes";
 import { editedPlace, notifyText, setError, setPlan } from "./state";
 
 /** The page's one edit queue, and the requests that it leads to. */
@@ -103,13 +104,8 @@ async function mergeStale(place: string): Promise<void> {
 export async function command(path: string, place: string, body?: object): Promise<boolean> {
   if (isObserver.value) return false;
   await allSent();
-  try {
+  return isDone(place, async () => {
     queue.takeAnswer(await requestJson<PlanState>("POST", path, body));
-    setError(place, null);
     showPlan();
-    return true;
-  } catch (error) {
-    setError(place, asErrorDoc(error));
-    return false;
-  }
+  });
 }

@@ -52,14 +52,15 @@ export const view = signal<ViewDoc>({
 });
 /** The terrain that the 3D view shows; null until the server says so. */
 export const pictured = signal<string | null>(null);
-export const selection = signal<SelectionDoc>({
+export const NOTHING_SELECTED: SelectionDoc = {
   tool: "select",
   poi_id: null,
   fence_mark: null,
   draft: [],
   place: null,
   site_rank: null,
-});
+};
+export const selection = signal(NOTHING_SELECTED);
 export const jobs = signal<ReadonlyMap<string, JobDoc>>(new Map());
 export const cursor = signal<CursorMessage | null>(null);
 export const link = signal<LinkState>("connecting");

@@ -16,7 +16,7 @@ export const NO_RADAR: UwbLiveDoc = {
   rule: "",
 };
 
-const NOTHING: TraversabilityState = {
+export const NO_GROUND: TraversabilityState = {
   state: "none",
   text: "",
   error: null,
@@ -38,7 +38,7 @@ const NOTHING: TraversabilityState = {
   live: NO_RADAR,
 };
 
-export const traversability = signal<TraversabilityState>(NOTHING);
+export const traversability = signal<TraversabilityState>(NO_GROUND);
 
 export const hasTraversability = computed(() => traversability.value.cells > 0);
 
@@ -63,5 +63,5 @@ export function tellGroundErrors(): void {
 }
 
 export function forgetTraversability(): void {
-  traversability.value = NOTHING;
+  traversability.value = NO_GROUND;
 }
