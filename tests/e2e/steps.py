@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import re
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from playwright.sync_api import Locator, Page, TimeoutError, expect
@@ -28,6 +29,24 @@ def wait_until(page: Page, condition: Callable[[], bool], timeout_ms: int = PATI
             return
         page.wait_for_timeout(200)
     raise AssertionError("not within the time allowed")
+
+
+@contextlib.contextmanager
+def again_and_again(act: Callable[[], None], every_s: float) -> Iterator[None]:
+    """What goes on beside the page, while the body runs."""
+    ended = threading.Event()
+
+    def acting() -> None:
+        while not ended.wait(every_s):
+            act()
+
+    thread = threading.Thread(target=acting)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
 
 
 def enter(page: Page, station: Station, origin: str = "") -> None:
@@ -224,6 +243,11 @@ def return_home(page: Page) -> None:
     disarmed(page)
 
 
+def land(page: Page) -> None:
+    hold(page, "land")
+    disarmed(page)
+
+
 def disarmed(page: Page) -> None:
     expect(page.get_by_test_id("chip-mode")).to_contain_text("disarmed", timeout=LONG_MS)
 
@@ -254,8 +278,9 @@ def play(page: Page, testid: str = "play") -> None:
     wait_until(page, plays)
 
 
-def play_alert(page: Page) -> None:
-    """From the event before the first alert on, with the instruments beside it."""
+def replay_alert(page: Page) -> None:
+    """Of the newest recording, from the event before the first alert on, with the instruments beside it."""
+    open_recording(page)
     events, banner = page.get_by_test_id("review-event"), page.get_by_test_id("alert-banner")
 
     def is_shown() -> bool:

@@ -10,18 +10,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.e2e.stations import Point, Station
-from tests.e2e.steps import (
-    disarmed,
-    drawn,
-    hold,
-    open_recording,
-    play_alert,
-    start,
-    start_simulator,
-    upload,
-    visit,
-    wait_until,
-)
+from tests.e2e.steps import drawn, hold, land, replay_alert, start, start_simulator, upload, visit, wait_until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
@@ -56,8 +45,7 @@ def test_an_obstacle_is_alerted_climbed_over_planned_around_and_reviewed(
     _is_acknowledged(page)
     _is_planned_against(page)
     _its_rest_is_planned(page, demo)
-    hold(page, "land")
-    disarmed(page)
+    land(page)
     _is_reviewed(page, tmp_path)
 
 
@@ -126,9 +114,8 @@ def _its_rest_is_planned(page: Page, demo: Station) -> None:
 
 
 def _is_reviewed(page: Page, tmp_path: Path) -> None:
-    open_recording(page)
     # The recorded alert stands over the 3D view again, and nobody has to answer it.
-    play_alert(page)
+    replay_alert(page)
     expect(page.get_by_test_id("alert-acknowledge")).to_have_count(0)
     replayed = page.get_by_test_id("instruments-replay")
     expect(replayed.get_by_test_id("polar")).to_be_visible()
@@ -144,8 +131,7 @@ def test_what_was_seen_in_that_flight_is_drawn(demo: Station, page_3d: Page) -> 
     """From its recording: a browser that renders in software would take the processor from sensors in flight."""
     page = page_3d
     visit(page, demo)
-    open_recording(page)
-    play_alert(page)
+    replay_alert(page)
     drawn(page)
     # Whatever the frame's page could not draw would stand in its console, which the fixture reads.
     expect(page.frame_locator("[data-testid=view-frame]").locator("canvas").first).to_be_visible()

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import re
 import socket
-import threading
 import time
 from collections.abc import Iterator
 
@@ -19,7 +19,7 @@ from telemetry.link.audit import open_audit
 from telemetry.link.keys import audit_key_file
 from telemetry.topics.messages import CommandRecord
 from tests.e2e.stations import SimulatedVehicle, Station
-from tests.e2e.steps import PATIENCE_MS, STREAM, certified, connect, enter, hold, open_demo
+from tests.e2e.steps import PATIENCE_MS, STREAM, again_and_again, certified, connect, enter, hold, open_demo
 from tests.free_ports import free_port
 from tests.server.station import ok
 from tests.telemetry.frames import heartbeat, packed
@@ -267,23 +267,15 @@ def test_signing_is_set_up_by_one_hold_and_switched_off_in_an_emergency(
 @contextlib.contextmanager
 def radio(port: int) -> Iterator[None]:
     """A vehicle that says no more than that it is there, from a port of its own."""
-    ended = threading.Event()
+    sequences = itertools.cycle(range(256))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
 
-    def beat() -> None:
-        sequence = 0
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
-            while not ended.wait(0.1):
-                sequence = (sequence + 1) % 256
-                with contextlib.suppress(ConnectionRefusedError):
-                    out.sendto(packed(heartbeat(), system=7, component=1, sequence=sequence), ("127.0.0.1", port))
+        def beat() -> None:
+            with contextlib.suppress(ConnectionRefusedError):
+                out.sendto(packed(heartbeat(), system=7, component=1, sequence=next(sequences)), ("127.0.0.1", port))
 
-    thread = threading.Thread(target=beat)
-    thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
+        with again_and_again(beat, 0.1):
+            yield
 
 
 def test_a_vehicle_that_comes_back_from_another_port_is_taken_by_one_press(station: Station, page: Page) -> None:

@@ -9,18 +9,7 @@ import pytest
 from playwright.sync_api import Page, TimeoutError, expect
 
 from tests.e2e.stations import Station
-from tests.e2e.steps import (
-    LONG_MS,
-    disarmed,
-    hold,
-    open_recording,
-    play_alert,
-    start,
-    start_simulator,
-    upload,
-    visit,
-    wait_until,
-)
+from tests.e2e.steps import LONG_MS, land, replay_alert, start, start_simulator, upload, visit, wait_until
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
@@ -112,11 +101,9 @@ def test_an_approach_is_alerted_evaded_and_reviewed(towards_another: Station, pa
     upload(page)
     start(page)
     _steps_aside(page)
-    hold(page, "land")
-    disarmed(page)
+    land(page)
 
-    open_recording(page)
-    play_alert(page)
+    replay_alert(page)
     page.get_by_test_id("display-velocity").click()
     expect(page.get_by_test_id("instruments-replay").get_by_test_id("velocity")).to_have_attribute(
         "data-state", "running"

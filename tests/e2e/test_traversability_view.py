@@ -7,8 +7,6 @@ import json
 import re
 import subprocess
 import sys
-import threading
-from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
@@ -17,7 +15,7 @@ from playwright.sync_api import Page, expect
 
 from server.door.sensor_token import sensor_token
 from tests.e2e.stations import Station
-from tests.e2e.steps import choose, click_surface, drawn, open_demo
+from tests.e2e.steps import again_and_again, choose, click_surface, drawn, open_demo
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
@@ -86,22 +84,10 @@ def test_a_file_that_is_no_radar_log_is_refused_where_it_was_opened(
     expect(page.get_by_test_id("work-out")).to_be_enabled()
 
 
-@contextlib.contextmanager
-def scanning(agent: IO[str]) -> Iterator[None]:
+def scanning(agent: IO[str]) -> contextlib.AbstractContextManager[None]:
     """Scan after scan: without any for two seconds a radar counts as silent."""
-    ended = threading.Event()
-
-    def scan() -> None:
-        while not ended.wait(0.05):
-            print(json.dumps({"type": "uwb", "intensity": [8.0] * 64}), file=agent, flush=True)
-
-    thread = threading.Thread(target=scan)
-    thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
+    scan = json.dumps({"type": "uwb", "intensity": [8.0] * 64})
+    return again_and_again(lambda: print(scan, file=agent, flush=True), 0.05)
 
 
 def test_a_radar_that_scans_now_is_shown_and_its_silence_is_told(station: Station, page: Page, tmp_path: Path) -> None:
