@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mapping.geometry.arrays import F64, Bools
+from mapping.tracking.tracker import Tracker
+from mapping.tracking.tracker_params import TrackState
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +40,16 @@ class Radar:
     detection_probability: float = 0.9
     false_alarms: float = 0.5
     every_s: float = 0.1
+
+
+def stepped(tracker: Tracker, frame: Frame) -> list[TrackState]:
+    return tracker.step(
+        frame.t_s,
+        frame.detections,
+        position_enu_m=frame.position_enu_m,
+        velocity_enu_m_s=frame.velocity_enu_m_s,
+        heading_rad=frame.heading_rad,
+    )
 
 
 def frames(

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from mapping.tracking.tracker import Tracker
 from mapping.tracking.tracker_params import TrackerParams, TrackState
-from tests.mapping.radar_scenes import Frame, Radar, frames, movers
+from tests.mapping.radar_scenes import Frame, Radar, frames, movers, stepped
 
 COORDINATES = ("cartesian", "polar")
 CLEAN = Radar(detection_probability=1.0, false_alarms=0.0)
@@ -21,16 +21,7 @@ ONE = np.array([[-8.0, 40.0, 1.5, 0.0]])
 
 def follow(scene: list[Frame], params: TrackerParams | None = None, tracker: Tracker | None = None):
     tracker = tracker or Tracker(params)
-    return [
-        tracker.step(
-            frame.t_s,
-            frame.detections,
-            position_enu_m=frame.position_enu_m,
-            velocity_enu_m_s=frame.velocity_enu_m_s,
-            heading_rad=frame.heading_rad,
-        )
-        for frame in scene
-    ]
+    return [stepped(tracker, frame) for frame in scene]
 
 
 def objects(states: list[TrackState]) -> list[TrackState]:

@@ -11,7 +11,7 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from mapping.tracking.tracker import Tracker
 from mapping.tracking.tracker_params import TrackerParams
-from tests.mapping.radar_scenes import Frame, frames, movers
+from tests.mapping.radar_scenes import Frame, frames, movers, stepped
 from tests.reference.stonesoup_gnn import follow
 
 FOUND_M = 5.0
@@ -64,13 +64,7 @@ def compared(seeds: Sequence[int], *, objects: int, count: int) -> Compared:
 def _ours(scene: Sequence[Frame]) -> list[F64]:
     tracker, out = Tracker(PARAMS), []
     for frame in scene:
-        states = tracker.step(
-            frame.t_s,
-            frame.detections,
-            position_enu_m=frame.position_enu_m,
-            velocity_enu_m_s=frame.velocity_enu_m_s,
-            heading_rad=frame.heading_rad,
-        )
+        states = stepped(tracker, frame)
         out.append(np.array([state.position_enu_m for state in states if state.confirmed]).reshape(-1, 2))
     return out
 

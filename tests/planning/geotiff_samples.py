@@ -40,6 +40,24 @@ def write_raster(
     return path
 
 
+def geotiff(elevation: NDArray[Any], **changes: Any) -> bytes:
+    """A GeoTIFF of (H, W) ``elevation`` in metres, one cell a metre; ``changes`` to its profile."""
+    profile = {
+        "driver": "GTiff",
+        "height": elevation.shape[0],
+        "width": elevation.shape[1],
+        "count": 1,
+        "dtype": "float32",
+        "crs": UTM,
+        "transform": Affine(1.0, 0.0, 500_000.0, 0.0, -1.0, 4_176_000.0),
+        **changes,
+    }
+    with rasterio.MemoryFile() as memory:
+        with memory.open(**profile) as dataset:
+            dataset.write(elevation.astype(np.float32), 1)
+        return memory.read()
+
+
 def hill(rows: int = 40, columns: int = 50) -> F32:
     """A smooth hill around 100 m."""
     y, x = np.mgrid[:rows, :columns]

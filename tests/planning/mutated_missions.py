@@ -10,8 +10,10 @@ import numpy as np
 
 from planning.basics.plan_model import FlownLine, Home, Mission, MissionItem
 from planning.certificate.certificate_model import ClearanceParams
+from planning.certificate.clearance import certify
+from planning.missions.flown import flown_line
 from planning.terrain.dsm import Dsm
-from tests.planning.test_clearance import NORTH, WEST, dsm_of
+from tests.planning.test_clearance import NORTH, PARAMS, WEST, dsm_of
 from tests.reference import clearance as oracle
 
 
@@ -33,6 +35,16 @@ def hugging_mission(cells: np.ndarray) -> Mission:
     items[2] = replace(items[2], alt_m=items[2].alt_m + 4.0)
     lat, lon = dsm.lat_lon_from_xy(np.array([[WEST + 12.5, NORTH - 30.5]]))[0]
     return Mission(Home(float(lat), float(lon), math.nan), (*items, MissionItem(20, 2)))
+
+
+def hugging_params(dsm: Dsm, mission: Mission, cells: np.ndarray) -> ClearanceParams:
+    """That demand 2 cm less than ``mission`` keeps, and let it return 2 cm higher than it must."""
+    home_m = float(cells[30, 12])
+    measured = replace(PARAMS, home_known_dsm_m=(home_m, home_m))
+    scout = certify(dsm, flown_line(mission, dsm), measured)
+    tight = replace(measured, required_clearance_m=scout.min_distance_m - 0.02)
+    needed_m = certify(dsm, flown_line(mission, dsm), tight).rtl_height_needed_m
+    return replace(tight, rtl_height_m=needed_m + 0.02)
 
 
 def _waypoint(dsm: Dsm, cells: np.ndarray, x: float, y: float, home_m: float) -> MissionItem:

@@ -12,6 +12,11 @@ from planning.planner.request import PlanRequest
 from planning.terrain.dsm import Dsm
 
 QUAD = VehicleProfile("quad", rtl_height_m=60.0, position_error_m=0.5)
+PLAN_FILES = {
+    "trajectory.csv", "trajectory.kml", "mission.waypoints", "mission.plan", "mission.geojson", "certificate.json",
+    "report.html",
+}  # fmt: skip
+"""What a finished plan is exported as, all of it."""
 
 
 @lru_cache

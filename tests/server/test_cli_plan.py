@@ -14,15 +14,12 @@ from pymavlink import mavwp
 
 from planning.ground.demo_hillside import demo_survey_polygon
 from planning.terrain.geotiff import read_dsm, write_dsm
+from tests.planning.plan_examples import PLAN_FILES
 from tests.server.cli_runs import Run, hedgehop
 
 KEYS = {
     "certified", "min_distance_m", "min_vertical_m", "required_clearance_m", "worst", "rtl_height_needed_m",
     "home_column_clear", "home", "length_m", "duration_s", "samples", "items", "dsm", "seconds", "reasons",
-}  # fmt: skip
-FILES = {
-    "trajectory.csv", "trajectory.kml", "mission.waypoints", "mission.plan", "mission.geojson", "certificate.json",
-    "report.html",
 }  # fmt: skip
 SURVEYED = ("--position-error-m", 0.1)
 """The first point lies on the edge of bush: with standalone GNSS no place nearby would do for home."""
@@ -199,7 +196,7 @@ def test_without_a_home_one_is_chosen_that_does_and_the_plan_says_so(
 
 
 def test_files(flight: tuple[Run, Path]) -> None:
-    assert {path.name for path in flight[1].iterdir()} == FILES
+    assert {path.name for path in flight[1].iterdir()} == PLAN_FILES
 
 
 def test_mission_read_by_pymavlink(flight: tuple[Run, Path]) -> None:
@@ -368,7 +365,7 @@ def test_hostile_names(hillside: tuple[Path, Path], tmp_path: Path) -> None:
     out = tmp_path / "out"
     run = planned((hillside[0], points), out)
     assert run.code == 0
-    assert {path.name for path in out.iterdir()} == FILES
+    assert {path.name for path in out.iterdir()} == PLAN_FILES
     page = (out / "report.html").read_text()
     assert "<script" not in page
     assert "<img" not in page

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
 
@@ -78,6 +79,15 @@ def test_many_seeds_are_flown_and_counted(flights: list[tuple[str, ScenarioReque
     assert (counted["passed"], counted["seeds"], len(counted["runs"])) == (1, [0, 1], 2)
 
 
+def are_refused(wrong: Mapping[tuple[object, ...], str], flights: list[tuple[str, ScenarioRequest]]) -> None:
+    """With these words each, before anything flies."""
+    for arguments, words in wrong.items():
+        run = hedgehop("scenario", *arguments)
+        assert run.code == 2, arguments
+        assert words in run.err
+    assert flights == []
+
+
 def test_what_cannot_be_flown_is_refused_before_anything_flies(
     flights: list[tuple[str, ScenarioRequest]], tmp_path: Path
 ) -> None:
@@ -93,11 +103,7 @@ def test_what_cannot_be_flown_is_refused_before_anything_flies(
         ("wood", "--seed", LARGEST_SEED - 1, "--seeds", 3): "The last seed would be 10,001",
         ("foliage", "--plots", tmp_path, "--seeds", 2): "Figures show one seed, not 2",
     }
-    for arguments, words in wrong.items():
-        run = hedgehop("scenario", *arguments)
-        assert run.code == 2, arguments
-        assert words in run.err
-    assert flights == []
+    are_refused(wrong, flights)
 
 
 def test_curves_are_asked_for_and_drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -138,11 +144,7 @@ def test_what_cannot_be_chosen_is_refused_by_its_name(flights: list[tuple[str, S
         ("wood", "--set", "tracker.gate=9"): "arena only",
         ("wood", "--radar", "iq"): "arena only",
     }
-    for arguments, words in wrong.items():
-        run = hedgehop("scenario", *arguments)
-        assert run.code == 2, arguments
-        assert words in run.err
-    assert flights == []
+    are_refused(wrong, flights)
 
 
 @pytest.mark.parametrize(

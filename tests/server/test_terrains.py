@@ -13,6 +13,7 @@ from affine import Affine
 from planning.terrain.dsm import Dsm
 from server.library.terrains import load_terrain
 from server.schemas import Computation, PlanDoc, PoiDoc, TerrainDoc
+from tests.planning.geotiff_samples import geotiff
 from tests.server.station import Station, ok, station
 
 pytestmark = pytest.mark.xdist_group("terrains")
@@ -179,19 +180,3 @@ def slope(*, spike_m: float = 0.0) -> bytes:
     elevation = np.add.outer(np.arange(60.0), np.arange(50.0)) * 0.1 + 100.0
     elevation[30, 25] += spike_m
     return geotiff(elevation)
-
-
-def geotiff(elevation: np.ndarray) -> bytes:
-    profile = {
-        "driver": "GTiff",
-        "height": elevation.shape[0],
-        "width": elevation.shape[1],
-        "count": 1,
-        "dtype": "float32",
-        "crs": "EPSG:32633",
-        "transform": Affine(1.0, 0.0, 500_000.0, 0.0, -1.0, 4_176_000.0),
-    }
-    with rasterio.MemoryFile() as memory:
-        with memory.open(**profile) as dataset:
-            dataset.write(elevation.astype(np.float32), 1)
-        return memory.read()

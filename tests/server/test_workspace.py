@@ -27,6 +27,7 @@ from server.schemas import (
     SelectionMessage,
     SetSelection,
 )
+from tests.planning.plan_examples import PLAN_FILES
 from tests.server.station import PATIENCE_S, Station, ok
 
 pytestmark = pytest.mark.xdist_group("workspace")
@@ -125,15 +126,7 @@ def test_every_export_comes_and_reads(demo: Station) -> None:
         assert archive.testzip() is None
         names = set(archive.namelist())
         certificate = json.loads(archive.read("certificate.json"))
-    assert names == {
-        "trajectory.csv",
-        "trajectory.kml",
-        "mission.waypoints",
-        "mission.plan",
-        "mission.geojson",
-        "certificate.json",
-        "report.html",
-    }
+    assert names == PLAN_FILES
     assert certificate["certified"] is True
     assert ok(demo.http.get("/api/plan/export/mission.waypoints")).text.startswith("QGC WPL 110")
 

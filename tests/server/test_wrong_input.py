@@ -20,6 +20,7 @@ from affine import Affine
 
 from planning.ground.demo_hillside import demo_dsm
 from server.schemas import JobDoc, PlanDoc, PoiDoc
+from tests.planning import geotiff_samples
 from tests.server.station import Station, ok
 
 pytestmark = pytest.mark.xdist_group("wrong-input")
@@ -38,22 +39,7 @@ def demo(demo_station: Station) -> Iterator[Station]:
 
 
 def geotiff(elevation: Any, **changes: Any) -> bytes:
-    elevation = np.asarray(elevation, dtype=np.float32)
-    profile = {
-        "driver": "GTiff",
-        "height": elevation.shape[0],
-        "width": elevation.shape[1],
-        "count": 1,
-        "dtype": "float32",
-        "crs": "EPSG:32633",
-        "transform": Affine(1.0, 0.0, 500_000.0, 0.0, -1.0, 4_176_000.0),
-        "nodata": -9999.0,
-        **changes,
-    }
-    with rasterio.MemoryFile() as memory:
-        with memory.open(**profile) as dataset:
-            dataset.write(elevation, 1)
-        return memory.read()
+    return geotiff_samples.geotiff(np.asarray(elevation), **({"nodata": -9999.0} | changes))
 
 
 SLOPE = np.add.outer(np.arange(60.0), np.arange(50.0)) + 100.0

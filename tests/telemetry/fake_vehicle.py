@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
+from collections.abc import AsyncIterator
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -63,6 +65,19 @@ async def beat(vehicle: UdpVehicle, *, hz: float = 10.0, message: Any = None) ->
     while True:
         vehicle.send(message or heartbeat())
         await asyncio.sleep(1 / hz)
+
+
+@contextlib.asynccontextmanager
+async def radio(port: int, *, message: Any = None, **ids: int) -> AsyncIterator[UdpVehicle]:
+    """A vehicle that beats ten times a second."""
+    vehicle = UdpVehicle(port, **ids)
+    task = asyncio.create_task(beat(vehicle, message=message))
+    try:
+        yield vehicle
+    finally:
+        task.cancel()
+        await asyncio.gather(task, return_exceptions=True)
+        vehicle.close()
 
 
 def ack(command: int, result: int) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from planning.basics.plan_model import Home, Mission, MissionItem
 from planning.formats.wpl import write_wpl
 from telemetry.recording.mcap_files.writer import RecordingWriter
+from telemetry.recording.player import Player
+from telemetry.recording.replay_sources import open_source
 from telemetry.topics.messages import (
     CommandRecord,
     FlightStatus,
@@ -115,3 +118,12 @@ def write_flight(path: Path, *, finish: bool = True, seconds: float = 20.0, rate
 
 def tlog_record(t_utc_s: float, frame: bytes) -> bytes:
     return round(t_utc_s * 1e6).to_bytes(8, "big") + frame
+
+
+@contextlib.contextmanager
+def opened(path: Path, now_s: float) -> Iterator[Player]:
+    """A player that has read what there is at the recording's beginning."""
+    player = Player(open_source(path), now_s)
+    player.open(now_s)
+    yield player
+    player.close()

@@ -103,6 +103,30 @@ def craft(*things: Place, by: str = "sidestep", **of) -> Followed:
     return it
 
 
+def holds_while_the_tracks_are_silent(it: Followed) -> None:
+    """From its way aside on; they stay silent."""
+    it.until(lambda: it.avoiding.detour.phase == "aside", 60)
+    it.silent = True
+    it.until(lambda: it.avoiding.status.state == "holding", 10)
+    it.until(lambda: (it.state.ground_speed_m_s or 0.0) < 0.3, 20)
+    assert "tracks have stopped" in it.avoiding.status.text
+    at_m = it.truth[0]
+    it.advance(5.0)
+    assert abs(it.truth[0] - at_m) < 1.0
+
+
+def ends_a_pause_on_its_way_aside(it: Followed) -> None:
+    it.until(lambda: it.avoiding.detour.phase == "aside", 60)
+    it.advance(1.0)
+    it.perform(it.avoiding.pause(it.now_s))
+    it.until(lambda: (it.state.ground_speed_m_s or 0.0) < 0.3, 20)
+    assert it.avoiding.status.state == "holding"
+    it.advance(3.0)
+    it.perform(it.avoiding.resume(it.now_s))
+    it.until(lambda: it.state.mode == "RTL")
+    assert it.nearest_m >= STANDS_M * 0.8
+
+
 @pytest.mark.parametrize("east_m", [-1.0, 0.0, 0.4, 1.5])
 def test_it_passes_a_pole_dead_ahead_level_and_comes_back_to_its_line(east_m: float) -> None:
     it = craft(stands(25.0, east_m))
@@ -179,14 +203,7 @@ def test_what_is_not_followed_but_seen_ahead_on_the_way_aside_makes_it_climb() -
 @pytest.mark.parametrize("resumes", [False, True])
 def test_when_the_tracks_stop_it_holds_until_they_come_again_or_it_is_told_to_go_on(resumes: bool) -> None:
     it = craft(stands(25.0, 0.0))
-    it.until(lambda: it.avoiding.detour.phase == "aside", 60)
-    it.silent = True
-    it.until(lambda: it.avoiding.status.state == "holding", 10)
-    it.until(lambda: (it.state.ground_speed_m_s or 0.0) < 0.3, 20)
-    assert "tracks have stopped" in it.avoiding.status.text
-    at_m = it.truth[0]
-    it.advance(5.0)
-    assert abs(it.truth[0] - at_m) < 1.0
+    holds_while_the_tracks_are_silent(it)
     if resumes:
         it.perform(it.avoiding.resume(it.now_s))
     else:
@@ -206,15 +223,7 @@ def test_where_no_velocity_leads_past_it_does_not_begin() -> None:
 
 def test_a_pause_on_the_way_aside_can_be_ended() -> None:
     it = craft(stands(25.0, 0.0))
-    it.until(lambda: it.avoiding.detour.phase == "aside", 60)
-    it.advance(1.0)
-    it.perform(it.avoiding.pause(it.now_s))
-    it.until(lambda: (it.state.ground_speed_m_s or 0.0) < 0.3, 20)
-    assert it.avoiding.status.state == "holding"
-    it.advance(3.0)
-    it.perform(it.avoiding.resume(it.now_s))
-    it.until(lambda: it.state.mode == "RTL")
-    assert it.nearest_m >= STANDS_M * 0.8
+    ends_a_pause_on_its_way_aside(it)
     assert it.modes()[-1] == RTL
 
 

@@ -79,6 +79,19 @@ async def reached(bench: Console, *addresses: str) -> None:
     await until(lambda: {each.address for each in bench.status.ways if each.identity == "known"} == set(addresses))
 
 
+@contextlib.asynccontextmanager
+async def two_ways(*, delay_s: float = 0.0, **options: Any) -> AsyncIterator[tuple[Simulator, Proxy, Proxy, Console]]:
+    """A vehicle that is heard over one way, which is in use, and over another one, as much later."""
+    async with (
+        vehicle(**options) as (simulator, port),
+        lossy_udp(port, loss=0.0) as one,
+        lossy_udp(port, loss=0.0, delay_s=delay_s) as other,
+        console() as bench,
+    ):
+        await reached(bench, at(one), at(other))
+        yield simulator, one, other, bench
+
+
 def sent_frames(bench: Console, *, spare: bool) -> list[bytes]:
     frames = [message for _, message in bench.published if isinstance(message, RawFrame)]
     return [raw.frame for raw in frames if raw.sent and raw.spare is spare]
@@ -136,13 +149,7 @@ def test_a_pause_is_obeyed_within_a_second_of_the_change_over(monkeypatch: pytes
     monkeypatch.setattr(time, "sleep", lambda seconds: pytest.fail(f"it blocks for {seconds} s"))
 
     async def whole() -> None:
-        async with (
-            vehicle() as (simulator, port),
-            lossy_udp(port, loss=0.0) as one,
-            lossy_udp(port, loss=0.0, delay_s=0.1) as other,
-            console() as bench,
-        ):
-            await reached(bench, at(one), at(other))
+        async with two_ways(delay_s=0.1) as (simulator, one, other, bench):
             report = await upload(bench, items(40))
             await start(bench, StartAuto(ME, report.onboard.digest))
             await phase(bench, "flying")
@@ -162,14 +169,8 @@ def test_a_pause_is_obeyed_within_a_second_of_the_change_over(monkeypatch: pytes
 
 def test_a_way_over_which_nothing_reaches_the_vehicle_is_left_though_it_is_heard() -> None:
     async def whole() -> None:
-        async with (
-            vehicle(speedup=1.0) as (simulator, port),
-            lossy_udp(port, loss=0.0) as one,
-            lossy_udp(port, loss=0.0, delay_s=0.1) as other,
-            console() as bench,
-        ):
+        async with two_ways(delay_s=0.1, speedup=1.0) as (simulator, one, other, bench):
             obeyed = Obeying(simulator)
-            await reached(bench, at(one), at(other))
             await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
             one.is_deaf, before = True, len(obeyed.orders)
             await until(lambda: used(bench) == at(other), 10.0)
@@ -187,13 +188,7 @@ def test_a_way_over_which_nothing_reaches_the_vehicle_is_left_though_it_is_heard
 
 def test_the_way_in_use_can_be_taken_away_and_a_new_one_added_and_the_last_one_releases() -> None:
     async def whole() -> None:
-        async with (
-            vehicle(speedup=1.0) as (_, port),
-            lossy_udp(port, loss=0.0) as one,
-            lossy_udp(port, loss=0.0) as other,
-            console() as bench,
-        ):
-            await reached(bench, at(one), at(other))
+        async with two_ways(speedup=1.0) as (_, one, other, bench):
             await bench.handle(Disconnect(ME, at(one)))
             there = bench.status.adopted
             assert there is not None
@@ -211,13 +206,7 @@ def test_the_way_in_use_can_be_taken_away_and_a_new_one_added_and_the_last_one_r
 
 def test_the_last_way_over_which_a_vehicle_is_heard_stays_while_it_may_fly_and_it_is_found_again_where_it_was() -> None:
     async def whole() -> None:
-        async with (
-            vehicle(speedup=1.0) as (_, port),
-            lossy_udp(port, loss=0.0) as one,
-            lossy_udp(port, loss=0.0) as other,
-            console() as bench,
-        ):
-            await reached(bench, at(one), at(other))
+        async with two_ways(speedup=1.0) as (_, one, other, bench):
             await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
             await bench.handle(Arm(ME))
             await until(lambda: bench.state.armed)
@@ -242,13 +231,7 @@ def test_the_last_way_over_which_a_vehicle_is_heard_stays_while_it_may_fly_and_i
 
 def test_aircraft_that_a_receiver_on_a_spare_way_hears_are_traffic_as_well() -> None:
     async def whole() -> None:
-        async with (
-            vehicle(speedup=1.0) as (_, port),
-            lossy_udp(port, loss=0.0) as one,
-            lossy_udp(port, loss=0.0) as other,
-            console() as bench,
-        ):
-            await reached(bench, at(one), at(other))
+        async with two_ways(speedup=1.0) as (_, one, other, bench):
             session = bench.link.session
             assert session is not None
             now_s = time.monotonic()
@@ -300,13 +283,7 @@ def test_over_two_ways_words_and_state_are_those_of_one() -> None:
 
 def test_a_vehicle_that_signs_is_reached_over_both_and_nothing_counts_as_a_replay() -> None:
     async def whole() -> None:
-        async with (
-            vehicle(speedup=1.0) as (_, port),
-            lossy_udp(port, loss=0.0) as one,
-            lossy_udp(port, loss=0.0, delay_s=0.2) as other,
-            console() as bench,
-        ):
-            await reached(bench, at(one), at(other))
+        async with two_ways(delay_s=0.2, speedup=1.0) as (_, one, other, bench):
             await bench.handle(SetSigning(ME, enabled=True))
             signed = len(bench.frames(sent=False))
             await until(lambda: len(bench.frames(sent=False)) > signed + 200)

@@ -35,6 +35,7 @@ SPEEDUP, HURRIED = 3.0, 15.0
 """Frames come in real time: it takes off and goes home faster than it flies towards a wall."""
 WALL = Wall(14.0, 17.0, thick_m=3.0)
 FRAME_S = 0.05
+CLIMBED = ["off", "watching", "climbing", "offset"]
 
 
 def avoidance(bench: Console) -> AvoidanceStatus:
@@ -44,6 +45,11 @@ def avoidance(bench: Console) -> AvoidanceStatus:
 def states(bench: Console) -> list[str]:
     found = [status.state for status in bench.of(AvoidanceStatus)]
     return [state for k, state in enumerate(found) if k == 0 or found[k - 1] != state]
+
+
+def climbing_states(bench: Console) -> list[str]:
+    """Each once, in their order; on the way it may hold or not."""
+    return [state for state in dict.fromkeys(states(bench)) if state != "holding"]
 
 
 def seen(simulator: Simulator, wall: Wall | None) -> PerceptionStatus:
@@ -86,6 +92,14 @@ async def landed(bench: Console, simulator: Simulator) -> None:
 async def switch_on(bench: Console) -> None:
     await bench.handle(SetAvoidance(ME, enabled=True))
     await until(lambda: avoidance(bench).state == "watching")
+
+
+async def taken_over_on_the_scripts_way(bench: Console, simulator: Simulator) -> None:
+    await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
+    await switch_on(bench)
+    await start(bench, StartGuided(ME, TARGETS, 10.0))
+    await taken_off(bench, simulator)
+    await until(lambda: avoidance(bench).state in ("climbing", "holding"))
 
 
 def test_a_real_vehicle_needs_consent_and_a_simulated_one_does_not() -> None:
@@ -139,12 +153,7 @@ def test_in_auto_it_climbs_over_a_wall_and_the_flight_ends_as_planned() -> None:
             await landed(bench, simulator)
             assert bench.flight.broke_off_at is None
             assert bench.flight.way == "auto"
-            assert [s for s in dict.fromkeys(states(bench)) if s != "holding"] == [
-                "off",
-                "watching",
-                "climbing",
-                "offset",
-            ]
+            assert climbing_states(bench) == CLIMBED
             assert "avoidance: climbing" in bench.commands
             assert not simulator.vehicle.autopilot.crashed
             modes = [s.mode for s in bench.of(type(bench.state)) if s.armed]
@@ -175,11 +184,7 @@ def test_on_the_way_to_where_a_flight_goes_on_it_climbs_over_a_wall_too() -> Non
 def test_the_scripts_flight_is_gone_on_with_higher_can_be_paused_and_ends_at_an_order() -> None:
     async def whole() -> None:
         async with before_a_wall() as (bench, simulator):
-            await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
-            await switch_on(bench)
-            await start(bench, StartGuided(ME, TARGETS, 10.0))
-            await taken_off(bench, simulator)
-            await until(lambda: avoidance(bench).state in ("climbing", "holding"))
+            await taken_over_on_the_scripts_way(bench, simulator)
             assert bench.flight.way == "guided"
             await until(lambda: avoidance(bench).state == "offset")
             await bench.handle(Pause(ME))
@@ -201,11 +206,7 @@ def test_a_certified_way_that_avoidance_takes_over_at_once_was_accepted() -> Non
 
     async def whole() -> None:
         async with before_a_wall() as (bench, simulator):
-            await until(lambda: bench.state.ready_to_arm and bench.state.estimator_ok)
-            await switch_on(bench)
-            await start(bench, StartGuided(ME, TARGETS, 10.0))
-            await taken_off(bench, simulator)
-            await until(lambda: avoidance(bench).state in ("climbing", "holding"))
+            await taken_over_on_the_scripts_way(bench, simulator)
             await bench.handle(Pause(ME))
             await until(lambda: (bench.state.ground_speed_m_s or 0.0) < 0.3 and bench.flight.phase == "paused")
             await bench.handle(way(bench, *TARGETS[-1:]))

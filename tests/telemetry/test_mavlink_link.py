@@ -38,23 +38,10 @@ from telemetry.topics.requests import (
     Upload,
 )
 from tests.free_ports import free_port
-from tests.telemetry.fake_vehicle import UdpVehicle, ack, beat
+from tests.telemetry.fake_vehicle import UdpVehicle, ack, radio
 from tests.telemetry.frames import ARMED, attitude, ground_station_heartbeat, heartbeat, packed
 from tests.telemetry.link_bench import ME, Console, console, until
 from tests.telemetry.own_time import run
-
-
-@contextlib.asynccontextmanager
-async def radio(port: int, *, message: Any = None, **ids: int) -> AsyncIterator[UdpVehicle]:
-    """A vehicle that beats ten times a second."""
-    vehicle = UdpVehicle(port, **ids)
-    task = asyncio.create_task(beat(vehicle, message=message))
-    try:
-        yield vehicle
-    finally:
-        task.cancel()
-        await asyncio.gather(task, return_exceptions=True)
-        vehicle.close()
 
 
 @contextlib.asynccontextmanager

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import math
 from typing import Any
 
@@ -16,7 +15,7 @@ from telemetry.mavlink.ranges import RangeReader
 from telemetry.topics.messages import Topic
 from telemetry.topics.requests import Connect
 from tests.free_ports import free_port
-from tests.telemetry.fake_vehicle import UdpVehicle, beat
+from tests.telemetry.fake_vehicle import radio
 from tests.telemetry.link_bench import ME, console, until
 from tests.telemetry.own_time import run
 
@@ -100,16 +99,10 @@ def test_ranges_of_the_adopted_vehicle_go_out_on_the_bus() -> None:
         port = free_port()
         async with console() as bench:
             await bench.handle(Connect(ME, f"udpin:127.0.0.1:{port}", True))
-            vehicle = UdpVehicle(port)
-            beating = asyncio.create_task(beat(vehicle))
-            try:
+            async with radio(port) as vehicle:
                 await bench.live()
                 vehicle.send(single(250, 0))
                 await until(lambda: bench.of(RangeFrame))
-            finally:
-                beating.cancel()
-                await asyncio.gather(beating, return_exceptions=True)
-                vehicle.close()
             (topic,) = {topic for topic, message in bench.published if isinstance(message, RangeFrame)}
             assert topic == Topic.RANGE_FRAME
             assert bench.last(RangeFrame).range_m == (2.5,)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import os
 import stat
 import time
@@ -21,7 +20,7 @@ from telemetry.simulation.simulator.run import SimOptions, flying
 from telemetry.topics.messages import RawFrame
 from telemetry.topics.requests import Arm, Connect, SetSigning
 from tests.free_ports import free_port
-from tests.telemetry.fake_vehicle import UdpVehicle, beat
+from tests.telemetry.fake_vehicle import UdpVehicle, radio
 from tests.telemetry.frames import attitude, heartbeat, packed
 from tests.telemetry.link_bench import ME, console, until
 from tests.telemetry.own_time import run
@@ -283,15 +282,11 @@ def test_a_vehicle_that_does_not_sign_is_said_and_goes_on_unsigned() -> None:
         port = free_port()
         async with console() as bench:
             await bench.handle(Connect(ME, f"udpin:127.0.0.1:{port}", True))
-            vehicle = UdpVehicle(port)
-            beating = asyncio.create_task(beat(vehicle))
-            await bench.live()
-            with pytest.raises(SilentError, match="has not begun to sign"):
-                await bench.handle(SetSigning(ME, True))
-            assert bench.status.signing.mode == "asked"
-            assert bench.status.state == "live"
-            beating.cancel()
-            await asyncio.gather(beating, return_exceptions=True)
-            vehicle.close()
+            async with radio(port):
+                await bench.live()
+                with pytest.raises(SilentError, match="has not begun to sign"):
+                    await bench.handle(SetSigning(ME, True))
+                assert bench.status.signing.mode == "asked"
+                assert bench.status.state == "live"
 
     run(whole)

@@ -5,7 +5,15 @@ from __future__ import annotations
 from functools import partial
 
 from tests.telemetry.px4_craft import Px4Craft
-from tests.telemetry.test_avoiding_aside import STANDS_M, Followed, Place, is_past, stands
+from tests.telemetry.test_avoiding_aside import (
+    STANDS_M,
+    Followed,
+    Place,
+    ends_a_pause_on_its_way_aside,
+    holds_while_the_tracks_are_silent,
+    is_past,
+    stands,
+)
 
 MEETS_S = 12.3
 """Until it is 30 m north by itself."""
@@ -58,13 +66,7 @@ def test_what_crosses_its_way_is_passed_at_its_safety_radius() -> None:
 
 def test_when_the_tracks_stop_it_holds_and_goes_on_when_they_come_again() -> None:
     it = px4_craft(stands(25.0, 0.0))
-    it.until(lambda: it.avoiding.detour.phase == "aside", 60)
-    it.silent = True
-    it.until(lambda: it.avoiding.status.state == "holding", 10)
-    it.until(lambda: (it.state.ground_speed_m_s or 0.0) < 0.3, 20)
-    at_m = it.truth[0]
-    it.advance(5.0)
-    assert abs(it.truth[0] - at_m) < 1.0
+    holds_while_the_tracks_are_silent(it)
     it.silent = False
     it.until(lambda: it.state.mode == "RTL")
     assert it.nearest_m >= STANDS_M * 0.8
@@ -72,12 +74,4 @@ def test_when_the_tracks_stop_it_holds_and_goes_on_when_they_come_again() -> Non
 
 def test_a_pause_on_the_way_aside_can_be_ended() -> None:
     it = px4_craft(stands(25.0, 0.0))
-    it.until(lambda: it.avoiding.detour.phase == "aside", 60)
-    it.advance(1.0)
-    it.perform(it.avoiding.pause(it.now_s))
-    it.until(lambda: (it.state.ground_speed_m_s or 0.0) < 0.3, 20)
-    assert it.avoiding.status.state == "holding"
-    it.advance(3.0)
-    it.perform(it.avoiding.resume(it.now_s))
-    it.until(lambda: it.state.mode == "RTL")
-    assert it.nearest_m >= STANDS_M * 0.8
+    ends_a_pause_on_its_way_aside(it)

@@ -17,7 +17,16 @@ from telemetry.topics.requests import FlyManoeuvre, MayFlyManoeuvre, Pause, Resu
 from tests.telemetry.avoiding_bench import Wall
 from tests.telemetry.link_bench import ME, Console, again_and_again, until
 from tests.telemetry.own_time import run
-from tests.telemetry.test_mavlink_avoidance import FRAME_S, HURRIED, avoidance, seen, states, switch_on
+from tests.telemetry.test_mavlink_avoidance import (
+    CLIMBED,
+    FRAME_S,
+    HURRIED,
+    avoidance,
+    climbing_states,
+    seen,
+    states,
+    switch_on,
+)
 from tests.telemetry.test_mavlink_flights import LAT_DEG, LON_DEG, STEP_DEG, phase, simulated, start, upload
 from tests.telemetry.test_px4_flights import QUICK
 
@@ -92,12 +101,7 @@ def test_in_its_mission_it_holds_climbs_over_a_wall_and_flies_the_rest_higher() 
             assert bench.flight.broke_off_at is None
             assert bench.flight.way == "auto"
             assert modes_in_the_air(bench)[:3] == ["MISSION", "HOLD", "RTL"]
-            assert [s for s in dict.fromkeys(states(bench)) if s != "holding"][:4] == [
-                "off",
-                "watching",
-                "climbing",
-                "offset",
-            ]
+            assert climbing_states(bench)[:4] == CLIMBED
             assert "avoidance: climbing" in bench.commands
             assert not watched.simulator.vehicle.autopilot.crashed
 

@@ -15,7 +15,7 @@ from telemetry.recording.player import Due, Player
 from telemetry.recording.replay_sources import open_source
 from telemetry.topics.messages import FlightStatus, LinkStatus, Topic, VehicleText
 from telemetry.topics.vehicle import VehicleState
-from tests.telemetry.recordings import T0_UTC_S, flight, write_flight
+from tests.telemetry.recordings import T0_UTC_S, flight, opened, write_flight
 
 NOW_S = 90_000.0
 SECONDS = 20.0
@@ -29,10 +29,8 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def player(path: Path) -> Iterator[Player]:
-    player = Player(open_source(path), NOW_S)
-    player.open(NOW_S)
-    yield player
-    player.close()
+    with opened(path, NOW_S) as player:
+        yield player
 
 
 def run(player: Player, from_s: float, to_s: float, step_s: float = 0.02) -> list[tuple[float, Due]]:

@@ -12,12 +12,11 @@ import pytest
 from telemetry.recording.mcap_files.reader import open_recording
 from telemetry.recording.mcap_files.writer import RecordingWriter
 from telemetry.recording.player import Due, Player
-from telemetry.recording.replay_sources import open_source
 from telemetry.topics.deltas import FoldedMap, in_parts
 from telemetry.topics.messages import REPLAY_PREFIX, Published, Topic
 from telemetry.topics.obstacles import MapDelta, MapOrigin, Obstacle, ObstacleAlert, PerceptionStatus
 from tests.telemetry import perception_flights as flights
-from tests.telemetry.recordings import T0_MONO_S, T0_UTC_S, state_at
+from tests.telemetry.recordings import T0_MONO_S, T0_UTC_S, opened, state_at
 
 NOW_S = 90_000.0
 SECONDS = 200
@@ -65,10 +64,8 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def player(path: Path) -> Iterator[Player]:
-    player = Player(open_source(path), NOW_S)
-    player.open(NOW_S)
-    yield player
-    player.close()
+    with opened(path, NOW_S) as player:
+        yield player
 
 
 def move(player: Player, t_s: float) -> list[Due]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -13,7 +12,7 @@ from telemetry.topics.obstacles import ObstacleAlert
 from telemetry.topics.requests import Connect
 from telemetry.topics.traffic import TrafficSettings, TrafficStatus
 from tests.free_ports import free_port
-from tests.telemetry.fake_vehicle import UdpVehicle, beat
+from tests.telemetry.fake_vehicle import radio
 from tests.telemetry.frames import ARMED, heartbeat, packed
 from tests.telemetry.link_bench import ME, console, until
 from tests.telemetry.own_time import run
@@ -31,9 +30,7 @@ def test_an_aircraft_on_the_wire_becomes_a_track_and_a_warning_by_the_settings_t
         async with console() as bench:
             bench.link.on_traffic_settings(TrafficSettings(warn_distance_m=500.0))
             await bench.handle(Connect(ME, f"udpin:127.0.0.1:{port}", True))
-            vehicle = UdpVehicle(port)
-            beating = asyncio.create_task(beat(vehicle, message=heartbeat(base_mode=ARMED)))
-            try:
+            async with radio(port, message=heartbeat(base_mode=ARMED)) as vehicle:
                 await until(lambda: bench.status.state == "live")
 
                 def look() -> TrafficStatus | None:
@@ -48,10 +45,6 @@ def test_an_aircraft_on_the_wire_becomes_a_track_and_a_warning_by_the_settings_t
                 assert bench.last(TrafficStatus).settings.warn_distance_m == 500.0
                 bench.link.on_traffic_settings(TrafficSettings())
                 await until(lambda: (look(), bench.of(ObstacleAlert))[1])
-            finally:
-                beating.cancel()
-                await asyncio.gather(beating, return_exceptions=True)
-                vehicle.close()
             begun = bench.of(ObstacleAlert)[0]
             assert (begun.sensor, begun.phase) == ("traffic", "begins")
             assert begun.text.startswith("Traffic HBABC, ")

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from planning.certificate.clearance import certify
 from planning.missions.flown import flown_line
-from tests.planning.mutated_missions import hilly, hugging_mission, is_safe, mutated
-from tests.planning.test_clearance import PARAMS, dsm_of
+from tests.planning.mutated_missions import hilly, hugging_mission, hugging_params, is_safe, mutated
+from tests.planning.test_clearance import dsm_of
 from tests.trust.rows import Row, judged
 
 
 def missions_row(mutations: int) -> Row:
     cells = hilly()
     dsm, mission = dsm_of(cells), hugging_mission(cells)
-    home_m = float(cells[30, 12])
-    measured = replace(PARAMS, home_known_dsm_m=(home_m, home_m))
-    scout = certify(dsm, flown_line(mission, dsm), measured)
-    tight = replace(measured, required_clearance_m=scout.min_distance_m - 0.02)
-    needed_m = certify(dsm, flown_line(mission, dsm), tight).rtl_height_needed_m
-    params = replace(tight, rtl_height_m=needed_m + 0.02)
+    params = hugging_params(dsm, mission, cells)
     rng, passed, wrong = np.random.default_rng(20260), 0, 0
     for _ in range(mutations):
         line = flown_line(mutated(mission, rng), dsm)
