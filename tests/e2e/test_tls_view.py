@@ -12,7 +12,7 @@ from playwright.sync_api import WebSocket, expect, sync_playwright
 
 from tests.e2e.conftest import FLAGS
 from tests.e2e.steps import PATIENCE_MS
-from tests.server.test_tls import Secure, station
+from tests.server.test_tls_served import Secure, station
 
 pytestmark = [pytest.mark.e2e, pytest.mark.usefixtures("console")]
 secure = station
@@ -48,7 +48,7 @@ def test_console_stream_and_view_come_by_tls(secure: Secure, chromium_path: str)
             page.on("websocket", opened)
             page.goto(secure.link)
             expect(page).to_have_url(f"{secure.origin}/#plan")
-            # The 3D view opens its socket in a worker, which tests do not see: tests/server/test_tls.py opens it.
+            # The 3D view opens its socket in a worker, which tests do not see: test_tls_served.py opens it.
             expect(page.locator("iframe").first).to_be_visible()
             stream, ends = f"wss://{host}:{port}/ws", time.monotonic() + PATIENCE_MS / 1000
             while not any(url.startswith(stream) for url in sockets):

@@ -55,7 +55,11 @@ HELD: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ),
     ("S11", "Every command is written down first; changed lines are told", (f"{T}test_audit.py",)),
     ("S12", "The container: no root, nothing writable, no capabilities", ("tests/test_docker.py",)),
-    ("S13", "No plain text beyond loopback; certificates of the laptop's own", (f"{S}test_tls.py",)),
+    (
+        "S13",
+        "No plain text beyond loopback; certificates of the laptop's own",
+        (f"{S}test_tls.py", f"{S}test_tls_served.py"),
+    ),
     ("S14", "The bus is the user's alone", (f"{T}test_bus_sockets.py",)),
     ("S15", "Names in files are text wherever they are shown", ("tests/planning/test_formats_safe_text.py",)),
 )
