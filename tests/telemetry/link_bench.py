@@ -21,8 +21,9 @@ from telemetry.topics.messages import (
     TransferStatus,
     VehicleText,
 )
-from telemetry.topics.requests import LinkRequest, Operator
+from telemetry.topics.requests import Connect, LinkRequest, Operator
 from telemetry.topics.vehicle import VehicleState
+from tests.free_ports import free_port
 
 PATIENCE_S = 60.0
 ME = Operator("Ann", 1)
@@ -117,6 +118,14 @@ async def console(**options: Any) -> AsyncIterator[Console]:
     async with open_link(bench.publish, **options) as link:
         bench.link = link
         yield bench
+
+
+@contextlib.asynccontextmanager
+async def listening(*, adopt: bool, **options: Any) -> AsyncIterator[tuple[Console, int]]:
+    port = free_port()
+    async with console(**options) as bench:
+        await bench.handle(Connect(ME, f"udpin:127.0.0.1:{port}", adopt))
+        yield bench, port
 
 
 __all__ = ["ME", "PATIENCE_S", "Console", "Topic", "console", "until"]
