@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import pytest
 from PIL import Image
@@ -79,7 +80,7 @@ def test_many_seeds_are_flown_and_counted(flights: list[tuple[str, ScenarioReque
     assert (counted["passed"], counted["seeds"], len(counted["runs"])) == (1, [0, 1], 2)
 
 
-def are_refused(wrong: Mapping[tuple[object, ...], str], flights: list[tuple[str, ScenarioRequest]]) -> None:
+def are_refused(wrong: Mapping[Any, str], flights: list[tuple[str, ScenarioRequest]]) -> None:
     """With these words each, before anything flies."""
     for arguments, words in wrong.items():
         run = hedgehop("scenario", *arguments)
