@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mapping.geometry import quaternions
 from mapping.geometry.arrays import F64
 
 EQUATOR_M = 6_378_137.0
@@ -169,3 +170,12 @@ def attitude_rotation(heading_rad: float, pitch_rad: float, roll_rad: float) -> 
     nose_up = np.array([[1.0, 0.0, 0.0], [0.0, cp, -sp], [0.0, sp, cp]])
     right_down = np.array([[cr, 0.0, sr], [0.0, 1.0, 0.0], [-sr, 0.0, cr]])
     return heading_rotation(heading_rad) @ nose_up @ right_down  # Miccinesi 2022, eq. 3
+
+
+def attitude_of(R_enu_body: F64) -> tuple[float, float, float]:
+    """Heading, pitch and roll: the inverse of ``attitude_rotation``."""
+    R = R_enu_body
+    pitch_rad = math.asin(min(1.0, max(-1.0, float(R[2, 1]))))
+    if math.hypot(R[2, 0], R[2, 2]) < 1e-9:  # straight up or down: only heading and roll together are known
+        return math.atan2(-R[1, 0], R[0, 0]) % (2 * math.pi), pitch_rad, 0.0
+    return quaternions.heading(R), pitch_rad, math.atan2(-R[2, 0], R[2, 2])

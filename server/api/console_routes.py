@@ -13,7 +13,7 @@ from planning.terrain.rasters.confinement import what_holds
 from server.api.access import Need, identity_of, needs, parts_of
 from server.api.session_routes import inline_policy, render
 from server.errors import NotFoundError, SignInError
-from server.schemas.health_docs import HealthDoc, LoopDoc
+from server.schemas.station_docs import HealthDoc, LoopDoc
 
 router = APIRouter(include_in_schema=False)
 

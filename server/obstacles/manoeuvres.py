@@ -13,13 +13,13 @@ from mapping.geometry.frames import apart_m
 from server.errors import NotFoundError, reported
 from server.obstacles.manoeuvre_situation import Prepared, none_possible
 from server.obstacles.manoeuvre_task import prepare
-from server.obstacles.sensed_flight import is_disarmed
 from server.obstacles.surroundings import Surroundings, are_maps_whole
 from server.scene.layers.region_layers import Route
 from server.schemas import ManoeuvreDoc
 from server.work.jobs import Lane
 from telemetry.bus.link_client import LinkClient
 from telemetry.errors import NotAllowedError
+from telemetry.mavlink.believing import is_disarmed
 from telemetry.topics.obstacles import ObstacleAlert
 from telemetry.topics.requests import FlyManoeuvre, MayFlyManoeuvre, Operator
 

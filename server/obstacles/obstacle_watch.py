@@ -11,7 +11,6 @@ from dataclasses import replace
 from server.errors import reported
 from server.heard.channel import Channel
 from server.obstacles.alert_list import LatchedAlerts
-from server.obstacles.sensed_flight import is_disarmed
 from server.scene.mirror import MapMirror
 from server.schemas import (
     AlertMessage,
@@ -25,6 +24,7 @@ from server.schemas import (
     Source,
 )
 from telemetry.flight.avoidance.regions import sees_enough_for
+from telemetry.mavlink.believing import is_disarmed
 from telemetry.topics.looks import CloudLook, RadarLook
 from telemetry.topics.obstacles import (
     MAP_NAMES,

@@ -24,7 +24,6 @@ from server.obstacles.obstacle_desk import ObstacleDesk
 from server.obstacles.obstacle_watch import Watch
 from server.obstacles.replayed import MAPS, STATUSES, Replayed
 from server.obstacles.section import Looking
-from server.obstacles.sensed_flight import SensedFlight
 from server.obstacles.sensor_nodes import KnownGround, SensorNodes
 from server.obstacles.surroundings import Surroundings
 from server.obstacles.traffic import TrafficDesk, TrafficWatch
@@ -34,6 +33,7 @@ from server.work.jobs import Lane
 from server.workspace import Workspace
 from telemetry.bus.bus import Bus
 from telemetry.bus.link_client import LinkClient
+from telemetry.mavlink.believing import is_in_the_air
 from telemetry.topics.messages import LinkStatus, Topic
 from telemetry.topics.obstacles import SENSORS, Sensor
 from telemetry.topics.requests import WholeMap
@@ -158,3 +158,33 @@ class Obstacles:
             except Exception as error:
                 log.warning("Asking the %s for its map: %s", sensor, reported(error, log, "Asking for a map").what)
             await asyncio.sleep(_ASK_EVERY_S)
+
+
+class SensedFlight:
+    """Which flight sensors see in: what was seen counts in it where a map begins anew, and no longer.
+
+    From when a vehicle is in the air until it is disarmed, or another one is heard.
+
+    It is the same vehicle wherever it is heard from, as its numbers say. One that is out of reach flies on. Arming is
+    none: home is set by it, maps begin anew around it, and who stands beside the vehicle then goes away.
+    """
+
+    def __init__(self) -> None:
+        self._vehicle: tuple[int, int] | None = None
+        """System and component."""
+        self._flies: bool | None = None
+
+    def on_state(self, state: VehicleState) -> list[bool]:
+        """What has changed, in order: True where a flight begins, False where none is under way any more."""
+        if not state.armed and state.heartbeat_t_mono_s is None:
+            return []  # nobody knows yet whether it is disarmed
+        vehicle, changes = (state.system_id, state.component_id), list[bool]()
+        if self._vehicle not in (None, vehicle) and self._flies:
+            changes.append(False)
+            self._flies = False
+        self._vehicle = vehicle
+        flies = state.armed and (bool(self._flies) or is_in_the_air(state))
+        if flies is not self._flies:
+            changes.append(flies)
+            self._flies = flies
+        return changes

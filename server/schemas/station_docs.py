@@ -1,4 +1,4 @@
-"""The station itself: what is wrong with it, and its log of commands."""
+"""The station itself: what is wrong with it, how it is, and its log of commands."""
 
 from __future__ import annotations
 
@@ -74,3 +74,25 @@ class AuditDoc(Strict):
     checked_utc_s: float | None
     newest: list[AuditEntryDoc]
     """The newest first."""
+
+
+class LoopDoc(Strict):
+    """How late the server's loop came round: for so long messages of vehicles waited in it."""
+
+    p99_ms: float
+    """Of the last ten minutes at most."""
+    longest_ms: float
+    longest_utc: str
+    since_utc: str
+    longest_work_ms: float
+    """Of the processor's time that the loop took for itself at once: not above 20, however busy the machine is."""
+
+
+class HealthDoc(Strict):
+    """Without a session only status and version."""
+
+    status: Literal["ok"] = "ok"
+    version: str
+    loop: LoopDoc | None = None
+    confinement: str | None = None
+    """What is refused to workers and to decoders of rasters on this machine."""

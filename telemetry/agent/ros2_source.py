@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from mapping.geometry import quaternions
 from mapping.geometry.arrays import F64
+from mapping.geometry.frames import attitude_of
 from telemetry.agent.client import CloudReading, NoticeReading, RadarReading, Reading
 from telemetry.agent.link_messages import TARGETS_MAX, Slam
 from telemetry.agent.live_radar import reading_of
 from telemetry.agent.ros2_status import Ros2Status
-from telemetry.recording.placed_state import attitude_of
 from telemetry.recording.ros.bag_types import POINT_TYPES, POSE_TYPES, TF
 from telemetry.recording.ros.placing import BASE_LINK, FORWARD_LEFT_UP, MOST_GAP_S
 from telemetry.recording.ros.point_messages import MalformedMessageError, points_of

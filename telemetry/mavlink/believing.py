@@ -226,3 +226,8 @@ def _place_follows(before: Place, after: Place, seconds: float) -> bool:
     seconds = max(seconds, after[3] - before[3])
     is_near = apart_m(before[:2], after[:2]) <= SLACK_M + FAST_M_S * seconds
     return is_near and abs(after[2] - before[2]) <= SLACK_M + FAST_CLIMB_M_S * seconds
+
+
+def is_disarmed(state: VehicleState | None) -> bool:
+    """By its own word: who has said nothing may fly."""
+    return state is not None and state.heartbeat_t_mono_s is not None and not state.armed

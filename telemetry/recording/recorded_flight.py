@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from mapping.geometry.arrays import F64
+from mapping.geometry.frames import LocalFrame, attitude_of
 from planning.basics.plan_model import Mission
 from planning.terrain.dsm import Dsm
 from telemetry.recording.frame_facts import SentTarget, TruePosition
@@ -163,3 +164,18 @@ class StateHistory:
                 if mode in ("AUTO", "MISSION") and armed and max(start, armed_start) < min(end, armed_end):
                     until = max(until, min(end, armed_end))
         return until
+
+
+def state_at(t_s: float, p_enu_m: F64, v_enu_m_s: F64 | None, R_enu_body: F64, home: LocalFrame) -> VehicleState:
+    """Armed, with position and attitude of that very moment; metres and heights count from ``home``."""
+    east, north, up = p_enu_m.tolist()
+    # Coordinates are read at the height of home again.
+    lat_deg, lon_deg, _ = home.to_geodetic([[east, north, 0.0]])[0].tolist()
+    heading_rad, pitch_rad, roll_rad = attitude_of(R_enu_body)
+    v = (None, None, None) if v_enu_m_s is None else v_enu_m_s.tolist()
+    return VehicleState(
+        1, 1, t_utc_s=t_s, heartbeat_t_mono_s=t_s, armed=True, position_t_mono_s=t_s, lat_deg=lat_deg, lon_deg=lon_deg,
+        alt_amsl_m=home.alt_m + up, alt_rel_home_m=up, v_east_m_s=v[0], v_north_m_s=v[1],
+        v_down_m_s=None if v[2] is None else -v[2], attitude_t_mono_s=t_s, roll_rad=roll_rad, pitch_rad=pitch_rad,
+        heading_rad=heading_rad, home_lat_deg=home.lat_deg, home_lon_deg=home.lon_deg, home_alt_amsl_m=home.alt_m,
+    )  # fmt: skip

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from server.heard.node_states import Nodes
-from server.obstacles.sensed_flight import SensedFlight
+from server.obstacles.obstacles import SensedFlight
 from telemetry.bus.node_lock import NodeLock
 from telemetry.topics.vehicle import VehicleState
 from tests.server.fakes import Told

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation, Slerp
 
-from mapping.geometry.frames import attitude_rotation
+from mapping.geometry.frames import attitude_of, attitude_rotation
 from telemetry.errors import RecordingError
-from telemetry.recording.placed_state import attitude_of
 from telemetry.recording.ros.bag_types import TRANSFORM
 from telemetry.recording.ros.transforms import Gap, Transform, tree_of
 

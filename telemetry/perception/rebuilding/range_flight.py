@@ -25,7 +25,7 @@ from telemetry.perception.convert import frame_of
 from telemetry.perception.rebuilding.log_readers import LogKind, RangeLog, read_range_log
 from telemetry.perception.whereabouts import has_fix, home_of, velocity_enu_m_s
 from telemetry.recording.mcap_files.writer import RecordingWriter
-from telemetry.recording.placed_state import state_at
+from telemetry.recording.recorded_flight import state_at
 from telemetry.recording.vehicle_logs.logged_ranges import Measured, in_time
 from telemetry.topics.messages import Topic
 from telemetry.topics.obstacles import MapOrigin

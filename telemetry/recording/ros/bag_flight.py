@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from mapping.geometry import quaternions
-from mapping.geometry.frames import LocalFrame
+from mapping.geometry.frames import LocalFrame, attitude_of
 from mapping.sensor_frames import CloudFrame, RadarFrame, RangeFrame, SensorFrame, SlamPose, packed, thinned
 from telemetry.errors import RecordingError
 from telemetry.recording.mcap_files.writer import RecordingWriter
-from telemetry.recording.placed_state import attitude_of, state_at
+from telemetry.recording.recorded_flight import state_at
 from telemetry.recording.ros.bag import BagContents, BagTable, Progress, read_bag
 from telemetry.recording.ros.bag_types import BAG_POINT_TYPES, POSE_TYPES, TF_TYPES
 from telemetry.recording.ros.placing import MOST_GAP_S, PlacedBag, PlacedCloud, PlacedPose, placed

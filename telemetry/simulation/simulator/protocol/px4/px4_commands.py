@@ -21,7 +21,7 @@ from telemetry.simulation.simulator.protocol.command_protocol import (
     asked_velocity,
     whole,
 )
-from telemetry.simulation.simulator.protocol.px4.px4_numbers import name_of
+from telemetry.simulation.simulator.protocol.px4.px4_streams import name_of
 
 ON_THE_GROUND_ONLY = {
     wire.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN,

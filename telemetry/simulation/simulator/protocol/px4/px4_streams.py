@@ -13,9 +13,17 @@ from telemetry.simulation.simulator.autopilot.pilot import Event, Reached
 from telemetry.simulation.simulator.autopilot.px4.px4_autopilot import Px4Pilot
 from telemetry.simulation.simulator.protocol.common_streams import CommonStreams
 from telemetry.simulation.simulator.protocol.px4.px4_metadata import component_metadata
-from telemetry.simulation.simulator.protocol.px4.px4_numbers import MODE_NUMBERS
 from telemetry.simulation.simulator.simulated_vehicle import SimulatedVehicle
 
+AUTO = 4
+_MAIN = {"MANUAL": 1, "ALTCTL": 2, "POSCTL": 3, "ACRO": 5, "OFFBOARD": 6, "STABILIZED": 7}
+_SUB = {"TAKEOFF": 2, "HOLD": 3, "MISSION": 4, "RTL": 5, "LAND": 6}
+MODE_NUMBERS: dict[str, int] = {
+    **{name: main << 16 for name, main in _MAIN.items()},
+    **{name: AUTO << 16 | sub << 24 for name, sub in _SUB.items()},
+}
+MODE_NAMES = {number: name for name, number in MODE_NUMBERS.items()}
+"""As a heartbeat's ``custom_mode`` has them: a main mode, and a sub mode of AUTO."""
 CAPABILITIES = (
     wire.MAV_PROTOCOL_CAPABILITY_FTP
     | wire.MAV_PROTOCOL_CAPABILITY_MISSION_INT
@@ -59,6 +67,10 @@ UNASKED_HZ: dict[int, float] = {
     wire.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
 }
 """In simulation, to port 14550. Where it is going is not among them (POSITION_TARGET_GLOBAL_INT)."""
+
+
+def name_of(main: int, sub: int) -> str | None:
+    return MODE_NAMES.get(main << 16 | (sub << 24 if main == AUTO else 0))
 
 
 class Px4Streams(CommonStreams):
