@@ -25,6 +25,8 @@ _STEADY_S = _PAUSES_S[-1]
 _LOOK_EVERY_S = 0.1
 SPARED = frozenset({"link"})
 """Without it nothing avoids obstacles: beside one that runs steadily a spare one waits."""
+LINK_HUNG_S = 1.5
+"""It proves twice a second that it works, and a spare one is there at once: nothing avoids obstacles meanwhile."""
 _TAKES_OVER_S, _SPARE_AGAIN_S = 2.0, 30.0
 """Until a spare one, which is loaded, has taken over; until the next one is loaded after one that failed."""
 
@@ -186,7 +188,8 @@ class Supervisor:
         """Until the process has ended. Returns True if it had to, because it was started for something else."""
         since_s = asyncio.get_running_loop().time()
         # Only the link must never be busy with anything for long.
-        liveness = Liveness(busy_s=HUNG_S, start_s=STARVED_S) if node.name == "link" else Liveness()
+        is_link = node.name == "link"
+        liveness = Liveness(hung_s=LINK_HUNG_S, busy_s=HUNG_S, start_s=STARVED_S) if is_link else Liveness()
         hung = ""
         while not process.has_ended():
             if facts := process.facts():
