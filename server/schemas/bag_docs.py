@@ -44,7 +44,7 @@ class BagRecordingBody(Strict):
     """As the options of ``hedgehop bag``."""
 
     points: FrameName
-    """Of PointCloud2, LaserScan or Range."""
+    """Of PointCloud2, LaserScan, Range or Livox's CustomMsg."""
     pose: FrameName | None = None
     """Null: the only topic of poses, else the transforms."""
     frame: FrameName | None = None

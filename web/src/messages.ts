@@ -1924,7 +1924,7 @@ export interface BagDoc {
 
 /** As the options of ``hedgehop bag``. */
 export interface BagRecordingBody {
-  /** Of PointCloud2, LaserScan or Range. */
+  /** Of PointCloud2, LaserScan, Range or Livox's CustomMsg. */
   points: string;
   /** Null: the only topic of poses, else the transforms. */
   pose?: string | null;

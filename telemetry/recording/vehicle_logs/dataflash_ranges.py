@@ -30,8 +30,8 @@ _SECTOR_RAD, _LAYER_RAD, _LEVEL_LAYER = math.radians(45.0), math.radians(30.0), 
 _LAYERS = range(5)
 _NEAREST_M = 0.1
 _COARSE = (
-    "PRX and PRXR tell the nearest thing of a sector 45° wide and 30° high: it may stand up to half of that beside "
-    "where the map has it."
+    "PRX and PRXR tell the nearest thing of a sector 45° wide and 30° high, up to 1 s old: it may stand up to half of "
+    "that, and as far as was flown meanwhile, beside where the map has it."
 )
 _SMOOTHED = "PRX is smoothed by the autopilot (PRX_FILT) and lags behind a vehicle that moves; PRX_LOG_RAW 1 logs PRXR."
 
