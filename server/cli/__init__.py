@@ -59,7 +59,7 @@ class _Commands(_Lazy):
     with_negative: ClassVar = frozenset({"goto"})
     places: ClassVar = {
         "serve": (".serve_command.serve", examples.SERVE),
-        "tls": (".tls_command.tls", examples.TLS),
+        "tls": (".door.tls_command.tls", examples.TLS),
         "plan": (".plan_command.plan", examples.PLAN),
         "certify": (".certify_command.certify", examples.CERTIFY),
         "survey": (".survey_command.survey", examples.SURVEY),
@@ -122,11 +122,11 @@ class _Ros2Commands(_Lazy):
 
 class _AccountCommands(_Lazy):
     places: ClassVar = {
-        "add": (".account_command.add", examples.ACCOUNT_ADD),
-        "list": (".account_command.list_", examples.ACCOUNT_LIST),
-        "link": (".account_command.link", examples.ACCOUNT_LINK),
-        "password": (".account_command.password", examples.ACCOUNT_PASSWORD),
-        "remove": (".account_command.remove", examples.ACCOUNT_REMOVE),
+        "add": (".door.account_command.add", examples.ACCOUNT_ADD),
+        "list": (".door.account_command.list_", examples.ACCOUNT_LIST),
+        "link": (".door.account_command.link", examples.ACCOUNT_LINK),
+        "password": (".door.account_command.password", examples.ACCOUNT_PASSWORD),
+        "remove": (".door.account_command.remove", examples.ACCOUNT_REMOVE),
     }
 
 

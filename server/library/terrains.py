@@ -15,8 +15,7 @@ from planning.errors import NoElevationError
 from planning.terrain.dsm import Dsm
 from planning.terrain.spikes import Spike
 from server.library.shelf import read_manifest, utc_now, write_manifest
-from server.library.stored_arrays import read_array, write_array
-from server.library.stored_cells import CellsManifest, read_cells, write_cells
+from server.library.stored_arrays import CellsManifest, read_array, read_cells, write_array, write_cells
 from server.library.whole_files import new_directory, new_id
 from server.schemas import CloudDoc, PlaceDoc, SpikeDoc, TerrainDoc
 from telemetry.topics.obstacles import GroundNotice

@@ -1,0 +1,1 @@
+"""``hedgehop account`` and ``hedgehop tls``: who may come in, and how other devices know this station."""
