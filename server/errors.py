@@ -23,6 +23,8 @@ ServerError
 ├── BusyError              too many pages or jobs, or shutting down
 ├── WorkerDiedError        the process that did the work ended (killed, out of memory)
 ├── ClusterError           no cluster of that name, or one that cannot do the work
+├── TargetError            no target of that name for a library, or one that cannot be read or written
+├── DamagedError           something in such a target that is not what it is called
 ├── CertificateError       the console's certificate cannot be made, read or used
 └── StartError             settings or port that Hedgehop cannot start with
 
@@ -148,6 +150,14 @@ class WorkerDiedError(ServerError):
 
 class ClusterError(ServerError):
     code = "cluster"
+
+
+class TargetError(ServerError):
+    code = "target"
+
+
+class DamagedError(ServerError):
+    code = "damaged"
 
 
 class CertificateError(ServerError):
