@@ -84,6 +84,7 @@ class _Commands(_Lazy):
         "radar": ("", ""),
         "ros2": ("", ""),
         "account": ("", ""),
+        "library": ("", ""),
     }
 
 
@@ -120,6 +121,14 @@ class _Ros2Commands(_Lazy):
     }
 
 
+class _LibraryCommands(_Lazy):
+    places: ClassVar = {
+        "push": (".library.commands.push", examples.LIBRARY_PUSH),
+        "pull": (".library.commands.pull", examples.LIBRARY_PULL),
+        "list": (".library.commands.list_", examples.LIBRARY_LIST),
+    }
+
+
 class _AccountCommands(_Lazy):
     places: ClassVar = {
         "add": (".door.account_command.add", examples.ACCOUNT_ADD),
@@ -149,7 +158,14 @@ ros2 = typer.Typer(
     rich_markup_mode="rich",
     cls=_Ros2Commands,
 )
-_GROUPS = {"radar": radar, "ros2": ros2, "account": account, "params": params, "logs": logs}
+library = typer.Typer(
+    name="library",
+    help="One library on several machines.",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    cls=_LibraryCommands,
+)
+_GROUPS = {"radar": radar, "ros2": ros2, "account": account, "params": params, "logs": logs, "library": library}
 app = typer.Typer(
     name="hedgehop",
     help="Plan drone flights that hug the terrain, prove their clearance, fly and review them.",

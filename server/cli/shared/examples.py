@@ -102,6 +102,16 @@ LOGS_GET = _examples(
     ("That of the last flight", "hedgehop logs get newest --link udpin:0.0.0.0:14550 --out logs"),
     ("One of the list", "hedgehop logs get 17 --link /dev/ttyACM0:115200"),
 )
+LIBRARY_PUSH = _examples(
+    ("To a stick, before the drive home", "hedgehop library push /media/crew/stick"),
+    ("What would go to a store", "hedgehop library push s3://survey/hedgehop --dry-run"),
+    ("What is there read again, and mended", "hedgehop library push /media/crew/stick --check"),
+)
+LIBRARY_PULL = _examples(
+    ("Onto the laptop in the office", "hedgehop library pull /media/crew/stick"),
+    ("Into another data directory, for a script", "hedgehop library pull s3://survey/hedgehop --data-dir all --json"),
+)
+LIBRARY_LIST = _examples(("What a stick holds", "hedgehop library list /media/crew/stick"))
 PARAMS_COMPARE = _examples(
     ("With a file", "hedgehop params compare before.param --link udpin:0.0.0.0:14550"),
     ("With another vehicle", "hedgehop params compare tcp:10.0.0.8:5760 --link tcp:10.0.0.7:5760"),
