@@ -19,7 +19,7 @@ from server.library.radar_files import RadarShelf
 from server.library.sharing.outcome import Outcome
 from server.library.sharing.pull import pull
 from server.library.sharing.push import push
-from server.library.sharing.targets import FolderTarget, Target
+from server.library.sharing.sharing_targets import FolderTarget, Target
 from server.library.terrains import store_terrain
 from server.schemas import PlanDoc
 from telemetry.recording.file_types import MCAP_MAGIC

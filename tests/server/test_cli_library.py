@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from server.cli.library import commands
-from server.cli.library.telling import Telling
+from server.cli.library.sharing_words import Telling
 from server.library.sharing.outcome import Done, Outcome
 from tests.server.cli_runs import hedgehop
 from tests.server.sharing_library import add_recording, closed_mcap, full_library, shared_files, write_plan
@@ -89,7 +89,7 @@ def test_ctrl_c_says_what_is_done(tmp_path: Path, stick: Path, monkeypatch: pyte
 def test_progress_is_shown_from_half_a_second_on(monkeypatch: pytest.MonkeyPatch) -> None:
     now_s, told = [0.0], []
     monkeypatch.setattr("time.monotonic", lambda: now_s[0])
-    monkeypatch.setattr("server.cli.library.telling.progress", lambda step, share: told.append((step, share)))
+    monkeypatch.setattr("server.cli.library.sharing_words.progress", lambda step, share: told.append((step, share)))
     telling = Telling()
     for now_s[0] in (0.1, 0.4, 0.6, 0.61, 0.8):
         telling.tell("Sending", now_s[0])

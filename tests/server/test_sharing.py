@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from server.errors import DataDirError, StorageFullError, TargetError
 from server.library.directory_lock import DirectoryLock
 from server.library.library import Library
-from server.library.sharing import items, local_items, pull
+from server.library.sharing import local_items, pull, shared_items
 from server.library.sharing.catalog import read_catalog
 from server.library.sharing.outcome import Outcome
-from server.library.sharing.targets import BLOBS, FOLDER, ITEMS, FolderTarget, StoreTarget, Target, open_target
+from server.library.sharing.sharing_targets import BLOBS, FOLDER, ITEMS, FolderTarget, StoreTarget, Target, open_target
 from tests.server.sharing_library import (
     PLAN_ID,
     BreakingTarget,
@@ -244,7 +244,7 @@ def test_names_that_are_no_names_elsewhere_are_sent_under_plain_ones(tmp_path: P
     assert send(one, stick).done
     brought = bring(two, stick)
     assert len(brought.done) == len([name for name in names if not name.startswith(".")])
-    assert all(items.is_name("recording", path.name) for path in (two / "recordings").iterdir())
+    assert all(shared_items.is_name("recording", path.name) for path in (two / "recordings").iterdir())
     assert send(two, stick).done == []
     assert bring(one, stick).done == []
 
@@ -353,7 +353,7 @@ def test_wherever_it_breaks_off_the_next_ones_end_with_the_same_content(
     held: dict[str, bytes], other: dict[str, bytes], push_at: int, pull_at: int, torn: bool, plan: bool
 ) -> None:
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as small:
-        small.setattr(items, "CHUNK_BYTES", 16)
+        small.setattr(shared_items, "CHUNK_BYTES", 16)
         small.setattr(local_items, "CHUNK_BYTES", 16)
         small.setattr(os, "fsync", lambda handle: None)  # no power goes here, and disks are slow at it
         base = Path(folder)

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from server.library.sharing.items import CHUNK_BYTES, MOST_ITEM_BYTES, digest_of
-from server.library.sharing.targets import BLOBS, FOLDER, FolderTarget
+from server.library.sharing.shared_items import CHUNK_BYTES, MOST_ITEM_BYTES, digest_of
+from server.library.sharing.sharing_targets import BLOBS, FOLDER, FolderTarget
 from tests.server.sharing_library import add_radar, add_recording, add_terrain, bring, closed_mcap, send, write_plan
 
 GOOD = b"an honest flight"
@@ -184,7 +184,7 @@ def test_items_that_claim_to_be_after_each_other_are_both_brought(tmp_path: Path
     plans = [item for item in items if item["kind"] == "plan"]
     contents = {digest for item in plans for digest in item["after"]}
     assert len(contents) == 1
-    from server.library.sharing.items import Item
+    from server.library.sharing.shared_items import Item
 
     both = [Item.model_validate_json(json.dumps(item)).content for item in plans]
     for item, other in zip(plans, reversed(both), strict=True):

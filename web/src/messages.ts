@@ -1438,6 +1438,26 @@ export interface AuditDoc {
   newest: AuditEntryDoc[];
 }
 
+/** How late the server's loop came round: for so long messages of vehicles waited in it. */
+export interface LoopDoc {
+  /** Of the last ten minutes at most. */
+  p99_ms: number;
+  longest_ms: number;
+  longest_utc: string;
+  since_utc: string;
+  /** Of the processor's time that the loop took for itself at once: not above 20, however busy the machine is. */
+  longest_work_ms: number;
+}
+
+/** Without a session only status and version. */
+export interface HealthDoc {
+  status?: "ok";
+  version: string;
+  loop?: LoopDoc | null;
+  /** What is refused to workers and to decoders of rasters on this machine. */
+  confinement?: string | null;
+}
+
 /** A line for each point; ``#`` begins a heading. */
 export interface ChecklistText {
   profile: string;

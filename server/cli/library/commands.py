@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from server.cli.library.telling import Telling, listed, outcome_lines
+from server.cli.library.sharing_words import Telling, listed, outcome_lines
 from server.cli.shared import options as o
 from server.cli.shared.command import DONE, FAILED, command
 from server.cli.shared.output import answer, end_progress, harmless, say
@@ -19,7 +19,7 @@ from server.library.sharing.catalog import read_catalog
 from server.library.sharing.outcome import LeftOut, Outcome
 from server.library.sharing.pull import pull as pull_library
 from server.library.sharing.push import push as push_library
-from server.library.sharing.targets import Target, open_target
+from server.library.sharing.sharing_targets import Target, open_target
 from server.settings import load_settings
 
 TargetPlace = Annotated[

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from pydantic import ValidationError
 
 from server.errors import TargetError
-from server.library.sharing.ahead import ahead
-from server.library.sharing.items import KINDS, MOST_ITEM_BYTES, FileEntry, Item, digest_of
 from server.library.sharing.outcome import LeftOut, Tell
-from server.library.sharing.targets import BLOBS, ITEMS, Target, item_path
+from server.library.sharing.reading_ahead import ahead
+from server.library.sharing.shared_items import KINDS, MOST_ITEM_BYTES, FileEntry, Item, digest_of
+from server.library.sharing.sharing_targets import BLOBS, ITEMS, Target, item_path
 
 STEP = "Reading the target"
 MOST_ITEMS = 200_000

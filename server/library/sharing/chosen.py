@@ -12,9 +12,9 @@ from pathlib import Path
 
 from server.errors import StorageError
 from server.library.sharing.catalog import VERSIONED, Catalog, newest
-from server.library.sharing.items import WORDS, FileEntry, Item, differ, suffix_of
 from server.library.sharing.local_items import FOLDERS, LocalItem, item_of
 from server.library.sharing.outcome import LeftOut, Outcome, Tell
+from server.library.sharing.shared_items import WORDS, FileEntry, Item, differ, suffix_of
 from server.library.sharing.versions import Versions
 
 STEP = "Comparing"

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from server.errors import DamagedError
-from server.library.sharing.ahead import ahead
-from server.library.sharing.items import FileEntry, digest_of
-from server.library.sharing.targets import Target, blob_path
+from server.library.sharing.reading_ahead import ahead
+from server.library.sharing.shared_items import FileEntry, digest_of
+from server.library.sharing.sharing_targets import Target, blob_path
 
 OnChunk = Callable[[int, bool], None]
 """Bytes, and whether they came over the line; what an earlier try had brought did not."""

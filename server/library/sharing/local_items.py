@@ -1,7 +1,7 @@
 """What of this data directory may be sent: surface models, orthophotos, radar files, recordings and plans, no more.
 
-Names are matched against an allow-list (``server.library.sharing.items.ALLOWED``), so that accounts, sessions, keys
-and tokens are no candidates, wherever they lie; links are never followed.
+Names are matched against an allow-list (``server.library.sharing.shared_items.ALLOWED``), so that accounts, sessions,
+keys and tokens are no candidates, wherever they lie; links are never followed.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from pathlib import Path
 from server.errors import StorageError
 from server.library import orthophotos, plans, radar_files, recording_list, terrains
 from server.library.library import VEHICLES
-from server.library.sharing.items import (
+from server.library.sharing.outcome import LeftOut
+from server.library.sharing.shared_items import (
     ALLOWED,
     CHUNK_BYTES,
     MOST_TITLE,
@@ -28,7 +29,6 @@ from server.library.sharing.items import (
     is_name,
     suffix_of,
 )
-from server.library.sharing.outcome import LeftOut
 from server.library.shelf import MANIFEST
 from server.library.whole_files import storage_errors
 from telemetry.recording.file_types import MCAP_MAGIC

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from planning.errors import DescribedError
-from server.library.sharing.items import WORDS, Kind
+from server.library.sharing.shared_items import WORDS, Kind
 
 Tell = Callable[[str, float], None]
 """Step and share, for a line of progress."""

@@ -12,8 +12,8 @@ from server.errors import DamagedError
 from server.library.orthophotos import OrthophotoManifest, load_orthophoto
 from server.library.plans import load_plan
 from server.library.radar_files import RadarFileManifest
-from server.library.sharing.items import WORDS, Item, suffix_of
 from server.library.sharing.local_items import is_closed
+from server.library.sharing.shared_items import WORDS, Item, suffix_of
 from server.library.shelf import read_manifest
 from server.library.terrains import TerrainManifest, load_terrain
 

@@ -14,12 +14,12 @@ from server.library.directory_lock import locked
 from server.library.sharing.catalog import Catalog, read_catalog
 from server.library.sharing.chosen import Wanted, choose, compare
 from server.library.sharing.fetch import OnChunk, fetch_file
-from server.library.sharing.items import WORDS
 from server.library.sharing.local_items import FOLDERS, local_items
 from server.library.sharing.outcome import Done, LeftOut, Outcome, Tell
 from server.library.sharing.proving import prove
 from server.library.sharing.push import check_apart
-from server.library.sharing.targets import ITEMS, Target
+from server.library.sharing.shared_items import WORDS
+from server.library.sharing.sharing_targets import ITEMS, Target
 from server.library.sharing.versions import Versions
 from server.library.whole_files import storage_errors, sync_directory
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from server.errors import DataDirError, StorageError, TargetError
-from server.library.sharing.ahead import Behind
 from server.library.sharing.catalog import UNCHANGING, VERSIONED, Catalog, read_catalog
-from server.library.sharing.items import WORDS, Item, differ, digest_of
 from server.library.sharing.local_items import LocalItem, item_of, local_items
 from server.library.sharing.outcome import Done, LeftOut, Outcome, Tell
-from server.library.sharing.targets import FolderTarget, Target, blob_path, item_path
+from server.library.sharing.reading_ahead import Behind
+from server.library.sharing.shared_items import WORDS, Item, differ, digest_of
+from server.library.sharing.sharing_targets import FolderTarget, Target, blob_path, item_path
 from server.library.sharing.versions import Versions
 
 STEP = "Sending"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from server.library.sharing.items import Digest
+from server.library.sharing.shared_items import Digest
 from server.library.whole_files import storage_errors, write_atomically
 
 FILE = "shared-versions.json"
@@ -27,7 +27,7 @@ class _Kept(BaseModel):
 
 
 class Versions:
-    """By key (``server.library.sharing.items.Item.key``), contents in the order in which they were had."""
+    """By key (``server.library.sharing.shared_items.Item.key``), contents in the order in which they were had."""
 
     def __init__(self, root: Path) -> None:
         self._file = root / FILE

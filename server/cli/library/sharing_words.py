@@ -10,8 +10,8 @@ from typing import Any
 
 from server.cli.shared.output import harmless, progress
 from server.library.sharing.catalog import Catalog, newest
-from server.library.sharing.items import KINDS, WORDS, Item
 from server.library.sharing.outcome import Outcome
+from server.library.sharing.shared_items import KINDS, WORDS, Item
 
 _AFTER_S, _EVERY_S = 0.5, 0.1
 
