@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +15,7 @@ from typing import Any, Literal
 from planning import __version__
 from server.work.node_process import NodeProcess, SpareNode, bound_log
 from telemetry import nodes
-from telemetry.bus.liveness import HUNG_S, STARVED_S, Liveness, Silence
+from telemetry.bus.liveness import HUNG_S, START_S, STARVED_S, Liveness, Silence
 from telemetry.bus.node_lock import NodeFacts, running_node, running_nodes, silence_counts
 from telemetry.bus.sockets import private_directory
 
@@ -28,7 +30,8 @@ SPARED = frozenset({"link"})
 LINK_HUNG_S = 1.5
 """It proves twice a second that it works, and a spare one is there at once: nothing avoids obstacles meanwhile."""
 _TAKES_OVER_S, _SPARE_AGAIN_S = 2.0, 30.0
-"""Until a spare one, which is loaded, has taken over; until the next one is loaded after one that failed."""
+"""Until a spare one, which is loaded, has taken over, longer if it is still loading; until the next one is loaded after
+one that failed."""
 
 
 State = Literal["starting", "running", "silent", "restarting", "stopped"]
@@ -43,6 +46,14 @@ class NodeState:
     state: State
     restarts: int = 0
     text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Taken:
+    """A spare one that was told to take over has proved nothing yet."""
+
+    pid: int
+    proved_t_mono_s: float
 
 
 class _Node:
@@ -153,18 +164,24 @@ class Supervisor:
         process = None if spare is None else spare.take(self._all_arguments(node.arguments))
         if process is None:
             return None
-        until_s = time.monotonic() + _TAKES_OVER_S
-        while not process.has_ended() and time.monotonic() < until_s:
+        node.process = process  # whoever stops the node meanwhile ends it
+        taken = _Taken(process.pid, time.monotonic())
+        liveness = Liveness(hung_s=_TAKES_OVER_S, start_s=_TAKES_OVER_S, busy_s=START_S)
+        while not process.has_ended() and not liveness.look(taken, time.monotonic()).is_hung:
             if process.facts():
                 return process
             await asyncio.sleep(_LOOK_EVERY_S / 5)
-        log.error("The spare %s node did not take over.", node.name)
+        log.error("The spare %s node did not take over. Its log is %s.", node.name, self._log(node))
         process.kill()
-        await process.ended()
+        with contextlib.suppress(TimeoutError):  # what a disk holds up ends later, and does nothing any more
+            async with asyncio.timeout(_TAKES_OVER_S):
+                await process.ended()
         return None
 
     def _keep_spare(self, node: _Node) -> None:
         if node.spare is not None and node.spare.process.has_ended():
+            code = node.spare.process.code
+            log.warning("The spare %s node ended (code %s). Its log is %s.", node.name, code, self._log(node))
             _end_spare(node)
             node.spare_again_s = time.monotonic() + _SPARE_AGAIN_S
         if node.spare is None and time.monotonic() > node.spare_again_s:
@@ -190,28 +207,36 @@ class Supervisor:
         # Only the link must never be busy with anything for long.
         is_link = node.name == "link"
         liveness = Liveness(hung_s=LINK_HUNG_S, busy_s=HUNG_S, start_s=STARVED_S) if is_link else Liveness()
-        hung = ""
+        hung, works_since_s = "", math.inf
         while not process.has_ended():
             if facts := process.facts():
                 silence = liveness.look(facts, time.monotonic())
-                if silence.is_hung and await silence_counts(self._runtime_dir):
-                    hung = f" after it had not answered for {silence.silent_s:.0f} s"
+                if silence.is_hung and await self._hangs_still(liveness, process):
+                    hung = f" after it had not answered for {silence.silent_s:.1f} s"
                     log.error("The %s node hangs and is killed.", node.name)
                     process.kill()
                 self._note(node, silence)
+                works_since_s = math.inf if silence.silent_s else min(works_since_s, time.monotonic())
                 outdated = not silence.silent_s and self._is_outdated(node, facts)
                 if outdated and await self._replace(node, process, facts):
                     return True
             if asyncio.get_running_loop().time() - since_s > _STEADY_S:
                 node.failures = 0
-                if node.name in SPARED:
-                    self._keep_spare(node)
-            bound_log(self._runtime_dir / f"{node.name}.log")
+            if node.name in SPARED and time.monotonic() - works_since_s > _STEADY_S:
+                self._keep_spare(node)
+            bound_log(self._log(node))
             await asyncio.sleep(_LOOK_EVERY_S)
         code = "" if process.code is None else f" (code {process.code})"
         node.last_end = f"The {node.name} node {'was ended' if hung else 'ended'}{hung or code}"
-        log.warning("%s. Its log is %s.", node.last_end, self._runtime_dir / f"{node.name}.log")
+        log.warning("%s. Its log is %s.", node.last_end, self._log(node))
         return False
+
+    async def _hangs_still(self, liveness: Liveness, process: NodeProcess) -> bool:
+        """Looked at once more, after the disk, which keeps the proofs: it may have worked again meanwhile."""
+        if not await silence_counts(self._runtime_dir):
+            return False
+        facts = process.facts()
+        return facts is not None and liveness.look(facts, time.monotonic()).is_hung
 
     def _note(self, node: _Node, silence: Silence) -> None:
         if silence.silent_s:
@@ -237,6 +262,9 @@ class Supervisor:
         node.failures += 1
         self._tell(node, "restarting", f"{node.last_end}.", restarts=node.state.restarts + 1)
         await asyncio.sleep(pause_s)
+
+    def _log(self, node: _Node) -> Path:
+        return self._runtime_dir / f"{node.name}.log"
 
     def _all_arguments(self, arguments: Sequence[str]) -> tuple[str, ...]:
         return "--runtime", str(self._runtime_dir), *arguments

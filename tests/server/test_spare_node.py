@@ -12,6 +12,7 @@ import pytest
 
 from server.work import supervisor
 from server.work.node_process import SpareNode
+from telemetry.bus.node_lock import running_node
 from tests.server.test_supervisor import PATIENCE_S, Watched, folder, run, supervised, until
 
 __all__ = ["folder"]
@@ -22,6 +23,7 @@ ARGUMENTS = ["--free", "a word with a space"]
 def at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(supervisor, "_STEADY_S", 0.0)
     monkeypatch.setattr(supervisor, "_TAKES_OVER_S", PATIENCE_S)
+    monkeypatch.setattr(supervisor, "LINK_HUNG_S", PATIENCE_S)
 
 
 async def spare_of(watched: Watched) -> SpareNode:
@@ -78,6 +80,40 @@ def test_one_that_does_not_take_over_is_killed_and_another_one_started(
             os.kill(spare.process.pid, signal.SIGSTOP)
             assert await killed(watched) != spare.process.pid
             assert not is_there(spare.process.pid)
+            await watched.supervisor.stop("link")
+
+    run(whole)
+
+
+def test_a_node_that_is_stopped_while_a_spare_one_takes_over_is_stopped(folder: Path) -> None:
+    async def whole() -> None:
+        async with supervised(folder) as watched:
+            await watched.supervisor.start("link", ARGUMENTS)
+            facts = await watched.running("link")
+            spare = await spare_of(watched)
+            os.kill(spare.process.pid, signal.SIGSTOP)
+            os.kill(facts.pid, signal.SIGKILL)
+            node = watched.supervisor._nodes["link"]
+            await until(lambda: node.process is spare.process)
+            os.kill(spare.process.pid, signal.SIGCONT)
+            await watched.supervisor.stop("link")
+            assert not is_there(spare.process.pid)
+            assert running_node(folder, "link") is None
+
+    run(whole)
+
+
+def test_one_that_still_loads_is_waited_for(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(supervisor, "_TAKES_OVER_S", 0.5)
+    (folder.parent / "small_nodes" / "slow.txt").touch()
+
+    async def whole() -> None:
+        async with supervised(folder) as watched:
+            await watched.supervisor.start("link", ARGUMENTS)
+            facts = await watched.running("link")
+            spare = await spare_of(watched)
+            os.kill(facts.pid, signal.SIGKILL)
+            assert (await watched.running("link", restarts=1)).pid == spare.process.pid
             await watched.supervisor.stop("link")
 
     run(whole)

@@ -12,7 +12,7 @@ from tests.soak.flight import BACK_S, Flown
 LATE_S = 1.5
 """A page reads what was said before a fault a little after it."""
 LINK_LOST_S = HUNG_S + LATE_S
-JUST_BACK_S = 1.0
+JUST_BACK_S = 0.3
 """What the next one says may be told sooner than that it runs, and both sooner than it is seen here."""
 
 
@@ -73,16 +73,19 @@ def _wrong_words(flown: Flown, done: Done) -> Iterator[str]:
     fault, page = done.fault, flown.page
     if fault.who != "link" or fault.how not in ("stop", "kill"):
         return
-    silent_s, until_s = done.at_s + LINK_LOST_S, min(done.back_s, _told_back_s(flown, done)) - JUST_BACK_S
-    watching = [
-        told
-        for told in page.since(silent_s, "obstacles", until_s)
-        if told.message["source"] == "live" and told.message["obstacles"]["avoidance"]["state"] == "watching"
+    until_s = min(done.back_s, _told_back_s(flown, done)) - JUST_BACK_S
+    avoidance = [
+        (told.t_mono_s, told.message["obstacles"]["avoidance"]["state"])
+        for told in page.since(done.at_s, "obstacles", until_s)
+        if told.message["source"] == "live"
     ]
-    live = [told for told in page.since(silent_s, "link", until_s) if told.message["link"]["state"] == "live"]
-    for what, found in (('avoidance was "watching"', watching), ('the link was "live"', live)):
-        if found:
-            yield f"{fault}: {what} {found[-1].t_mono_s - done.at_s:.1f} s after it."
+    links = [(told.t_mono_s, told.message["link"]["state"]) for told in page.since(done.at_s, "link", until_s)]
+    for what, known, told in (("avoidance", "watching", avoidance), ("the link", "live", links)):
+        # Once it was said to be lost, and from the promised time on at the latest, until the next link is there.
+        from_s = min([done.at_s + LINK_LOST_S, *(t_s for t_s, state in told if state == "lost")])
+        late = [t_s for t_s, state in told if state == known and t_s >= from_s]
+        if late:
+            yield f'{fault}: {what} was "{known}" {late[-1] - done.at_s:.1f} s after it.'
 
 
 def _told_back_s(flown: Flown, done: Done) -> float:
