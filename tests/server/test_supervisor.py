@@ -378,6 +378,38 @@ def test_a_node_that_is_silent_for_a_moment_goes_on(folder: Path, monkeypatch: p
     run(whole)
 
 
+def test_a_link_that_works_again_while_the_disk_is_asked_is_not_killed(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # On a busy machine one that works again may seem to hang once more: it is looked at by its first proof.
+    looked = asyncio.Event()
+
+    async def works_again(_: Path) -> bool:
+        facts = running_node(folder, "link")
+        assert facts is not None
+        os.kill(facts.pid, signal.SIGCONT)
+        await proved(folder)
+        looked.set()
+        return True
+
+    async def whole() -> None:
+        async with supervised(folder) as watched:
+            await watched.supervisor.start("link", [])
+            await watched.running("link")
+            await proved(folder)
+            state = watched.state("link")
+            facts = running_node(folder, "link")
+            assert state is not None
+            assert facts is not None
+            monkeypatch.setattr(supervisor, "silence_counts", works_again)
+            os.kill(facts.pid, signal.SIGSTOP)
+            await asyncio.wait_for(looked.wait(), PATIENCE_S)
+            assert (await watched.running("link", restarts=state.restarts)).pid == facts.pid
+            await watched.supervisor.stop("link")
+
+    run(whole)
+
+
 async def proved(folder: Path) -> None:
     """Until the link has proved from now on that it works."""
     since_s = time.monotonic()
