@@ -16,7 +16,11 @@ from tests.trust.rows import Row, judged
 T, S = "tests/telemetry/", "tests/server/"
 HELD: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("R4", "A silent vehicle: stale at 1.5 s, lost at 3.5 s", (f"{T}test_mavlink_link.py",)),
-    ("R5", "A node that hangs is said, ended and started again", (f"{T}test_liveness.py", f"{S}test_supervisor.py")),
+    (
+        "R5",
+        "A node that hangs is said, ended and started again",
+        (f"{T}test_liveness.py", f"{S}test_supervisor_hangs.py", f"{S}test_spare_node.py"),
+    ),
     ("R8", "Hostile MAVLink raises nothing and costs no memory", (f"{T}test_mavlink_codec.py", f"{T}test_reduce.py")),
     ("R9", "Connections that end are opened again, and leak nothing", (f"{T}test_mavlink_connections.py",)),
     (
