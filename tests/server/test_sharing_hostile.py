@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from server.errors import StorageFullError
+from server.library.sharing import push
 from server.library.sharing.shared_items import CHUNK_BYTES, MOST_ITEM_BYTES, digest_of
 from server.library.sharing.sharing_targets import BLOBS, FOLDER, FolderTarget
 from tests.server.sharing_library import add_radar, add_recording, add_terrain, bring, closed_mcap, send, write_plan
@@ -138,9 +141,11 @@ def test_a_blob_that_is_no_whole_file_is_sent_anew(tmp_path: Path, stick: Folder
         assert send(tmp_path / "honest", stick).stopped is not None
 
 
-def test_a_blob_of_one_chunk_repeated_for_ever_finds_no_room(tmp_path: Path, stick: FolderTarget) -> None:
-    from server.errors import StorageFullError
-
+def test_a_blob_of_one_chunk_repeated_for_ever_finds_no_room(
+    tmp_path: Path, stick: FolderTarget, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    free = shutil.disk_usage(tmp_path)._replace(free=1 << 39)
+    monkeypatch.setattr(shutil, "disk_usage", lambda place: free)
     entry = put_blob(stick, bytes(CHUNK_BYTES))
     many = 100_000
     put_item(stick, an_item(**a_file(bytes=CHUNK_BYTES * many, chunks=entry["chunks"] * many)))
@@ -148,7 +153,10 @@ def test_a_blob_of_one_chunk_repeated_for_ever_finds_no_room(tmp_path: Path, sti
         bring(tmp_path / "two", stick)
 
 
-def test_what_calls_itself_another_thing_or_reaches_outside_is_refused(tmp_path: Path, stick: FolderTarget) -> None:
+def test_what_calls_itself_another_thing_or_reaches_outside_is_refused(
+    tmp_path: Path, stick: FolderTarget, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(push, "prove_own", lambda local: None)
     evil = tmp_path / "evil"
     terrain, radar, plan = add_terrain(evil), add_radar(evil), write_plan(evil, "Evil")
     (evil / "terrains" / terrain).rename(evil / "terrains" / "0123456789abcdef")

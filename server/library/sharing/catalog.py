@@ -28,6 +28,8 @@ class Catalog:
     items: list[Item] = field(default_factory=list)
     """By kind, name and content."""
     faults: list[LeftOut] = field(default_factory=list)
+    damaged: list[str] = field(default_factory=list)
+    """Names of items that do not match them; each is among the faults too, as ``damage_of`` says it."""
     blob_sizes: dict[str, int] = field(default_factory=dict)
     item_sizes: dict[str, int] = field(default_factory=dict)
 
@@ -60,10 +62,12 @@ def read_catalog(target: Target, tell: Tell) -> Catalog:
     def read(name: str) -> Item | LeftOut:
         return _read_item(target, name)
 
-    for number, found in enumerate(ahead(read, names, target.threads)):
+    for number, (name, found) in enumerate(zip(names, ahead(read, names, target.threads), strict=True)):
         tell(STEP, number / len(names))
         if isinstance(found, LeftOut):
             catalog.faults.append(found)
+            if found == damage_of(name):
+                catalog.damaged.append(name)
         else:
             catalog.items.append(found)
     catalog.items.sort(key=lambda item: (KINDS.index(item.kind), item.name, item.content, item.title))
@@ -80,6 +84,11 @@ def newest(items: Sequence[Item]) -> list[Item]:
     return list({item.content: item for item in left}.values())
 
 
+def damage_of(name: str) -> LeftOut:
+    advice = "Push again from where it is; a push sets it aside once it is older than a day."
+    return LeftOut("The item is damaged: it does not match its name.", f"{ITEMS}/{name[:80]}", advice)
+
+
 def _read_item(target: Target, name: str) -> Item | LeftOut:
     """One that cannot be read is a fault as one that is damaged: the others may be whole."""
     where = f"{ITEMS}/{name[:80]}"
@@ -88,7 +97,7 @@ def _read_item(target: Target, name: str) -> Item | LeftOut:
         if len(data) > MOST_ITEM_BYTES:
             return LeftOut("The item is larger than any can be.", where)
         if f"{digest_of(data)}{_ENDING}" != name:
-            return LeftOut("The item is damaged: it does not match its name.", where, "Push again from where it is.")
+            return damage_of(name)
         return Item.model_validate_json(data)
     except TargetError as error:
         return LeftOut.of(error, where)

@@ -43,6 +43,8 @@ class Here:
     """By key, then by name inside the item."""
     held: dict[str, str] = field(default_factory=dict)
     """By key, the content that stands under it."""
+    taken: set[str] = field(default_factory=set)
+    """Keys where nothing stood and one is to stand now, which was made of none of the others that are newest."""
 
 
 def compare(local: Sequence[LocalItem], catalog: Catalog, tell: Tell) -> Here:
@@ -80,6 +82,8 @@ def choose(catalog: Catalog, here: Here, root: Path, versions: Versions, outcome
                 outcome.left_out.append(found)
                 continue
             wanted.append(found)
+            if found.name == item.name and item.key not in here.files:
+                here.taken.add(item.key)
             here.contents.add(item.content)
             files = here.files.setdefault(f"{item.kind}/{found.name}", {})
             files |= {entry.name: entry for entry in found.files}
@@ -98,7 +102,7 @@ def _one(item: Item, here: Here, root: Path, versions: Versions) -> Wanted | Lef
         return LeftOut(what, _place(item), "Start Hedgehop once, which sets it aside, and pull again.")
     if not is_here:
         return Wanted(item, item.name, item.files)
-    if item.kind in VERSIONED and item.content in versions.had(item.key):
+    if item.kind in VERSIONED and item.key not in here.taken and item.content in versions.had(item.key):
         return None  # what is here was made of it
     if item.kind == "plan":
         name = item.content[:_ID]

@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from pydantic import ValidationError
+
 from server.errors import StorageError
 from server.library import orthophotos, plans, radar_files, recording_list, terrains
 from server.library.library import VEHICLES
@@ -65,6 +67,9 @@ class LocalItem:
         """As people know it here."""
         return f"{WORDS[self.kind]} {self.title}"
 
+    def file_names(self) -> set[str]:
+        return {name for name, _ in self.files}
+
     def sizes(self) -> dict[str, int]:
         """Raises StorageError when a file has gone."""
         with storage_errors(self.files[0][1]):
@@ -103,7 +108,11 @@ def item_of(local: LocalItem, after: tuple[str, ...] = (), on_chunk: OnChunk = l
         entries.append(FileEntry(name=name, bytes=size, chunks=tuple(chunks)))
     if _state(local) != before or {entry.name: entry.bytes for entry in entries} != local.sizes():
         raise _changing(local.place)
-    return Item(kind=local.kind, name=local.name, title=local.title, files=tuple(entries), after=after)
+    try:
+        return Item(kind=local.kind, name=local.name, title=local.title, files=tuple(entries), after=after)
+    except ValidationError as error:  # a model with more files than an item takes
+        fault = " ".join(error.errors(include_url=False, include_input=False)[0]["msg"].split())[:200]
+        raise StorageError(f"It cannot be an item of a target: {fault}.", where=local.place) from error
 
 
 def read_chunks(path: Path) -> Iterator[bytes]:

@@ -6,7 +6,7 @@ import errno
 import os
 import shutil
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
 from server.errors import DamagedError, DataDirError, StorageError, StorageFullError, TargetError
@@ -17,17 +17,20 @@ from server.library.sharing.fetch import OnChunk, fetch_file
 from server.library.sharing.local_items import FOLDERS, local_items
 from server.library.sharing.outcome import Done, LeftOut, Outcome, Tell
 from server.library.sharing.proving import prove
-from server.library.sharing.push import check_apart
+from server.library.sharing.push import check_apart, save_versions
 from server.library.sharing.shared_items import WORDS
 from server.library.sharing.sharing_targets import ITEMS, Target
 from server.library.sharing.versions import Versions
-from server.library.whole_files import storage_errors, sync_directory
+from server.library.whole_files import TEMPORARY, new_id, storage_errors, sync_directory
 
 STAGING = "pulling"
 """Of the data directory: what is on its way; a pull that broke off goes on there."""
 STEP = "Bringing"
 SPARE_BYTES = 64 * 1024**2
 """Left free on the disk."""
+_NO_LINKS = {errno.EPERM, errno.EACCES, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS}
+"""What file systems without a second name for a file answer."""
+_COPY_BYTES = 8 * 1024**2
 
 
 def pull(root: Path, target: Target, outcome: Outcome, tell: Tell, *, dry_run: bool = False) -> None:
@@ -61,13 +64,17 @@ def _pull(root: Path, target: Target, catalog: Catalog, outcome: Outcome, tell: 
         return
     _remove_staging(root, keep={each.item.content for each in wanted})
     _check_room(root, wanted)
+    for each in wanted:
+        if each.item.key in here.taken and each.name == each.item.name:
+            versions.begin(each.item.key, [*each.item.after, each.item.content])
+    save_versions(versions, outcome)  # before: a pull that is killed has then forgotten nothing
     try:
-        _bring_all(root, target, wanted, versions, outcome, tell)
-        _remove_staging(root)
+        unread = _bring_all(root, target, wanted, versions, outcome, tell)
+        _remove_staging(root, keep=unread)
     except (TargetError, StorageFullError) as error:
         outcome.stopped = LeftOut.of(error)
     finally:
-        versions.save()
+        save_versions(versions, outcome)
 
 
 @contextmanager
@@ -84,7 +91,9 @@ def _own(root: Path) -> Iterator[None]:
 
 def _bring_all(
     root: Path, target: Target, wanted: list[Wanted], versions: Versions, outcome: Outcome, tell: Tell
-) -> None:
+) -> set[str]:
+    """Contents that the target did not give whole: what came of them is kept, and the next pull goes on there."""
+    unread = set[str]()
     total = max(1, sum(each.bytes for each in wanted))
     come = 0
 
@@ -107,11 +116,13 @@ def _bring_all(
         except TargetError as error:
             if not target.sizes(ITEMS):  # the whole target has gone
                 raise
+            unread.add(each.item.content)
             outcome.left_out.append(LeftOut.of(error, f"{WORDS[each.item.kind]} {each.item.title}"))
         else:
             outcome.done.append(_done(each))
             if each.name == each.item.name:
                 versions.add(each.item.key, [*each.item.after, each.item.content])
+    return unread
 
 
 def _bring(root: Path, staging: Path, target: Target, wanted: Wanted, on_chunk: OnChunk) -> None:
@@ -131,8 +142,7 @@ def _bring(root: Path, staging: Path, target: Target, wanted: Wanted, on_chunk: 
             _give_name(staging / entry.name, place / entry.name)
     else:
         prove(item, staging)
-        os.rename(staging, place)
-        sync_directory(shelf)
+        _give_folder_name(staging, place)
     shutil.rmtree(staging, ignore_errors=True)
 
 
@@ -141,11 +151,58 @@ def _give_name(staged: Path, place: Path) -> None:
     try:
         os.link(staged, place)
         staged.unlink()
-    except PermissionError:  # a file system without a second name for a file
+    except OSError as error:
+        if error.errno == errno.EXDEV:
+            with _beside(place) as aside:
+                _copy_durably(staged, aside)
+                _give_name(aside, place)
+            return
+        if error.errno not in _NO_LINKS:
+            raise
         if place.exists():
             raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(place)) from None
         os.rename(staged, place)
     sync_directory(place.parent)
+
+
+def _give_folder_name(staged: Path, place: Path) -> None:
+    """Fails where there is such a folder with something in it."""
+    try:
+        os.rename(staged, place)
+    except OSError as error:
+        if error.errno != errno.EXDEV:
+            raise
+        with _beside(place) as aside:
+            aside.mkdir(mode=0o700)
+            for path in staged.iterdir():
+                _copy_durably(path, aside / path.name)
+            sync_directory(aside)
+            os.rename(aside, place)
+    sync_directory(place.parent)
+
+
+@contextmanager
+def _beside(place: Path) -> Iterator[Path]:
+    """A name on the disk where a linked folder of the library leads; what is still there at the end is removed."""
+    aside = place.with_name(f"{TEMPORARY}{place.name}-{new_id()}")
+    try:
+        yield aside
+    finally:
+        if aside.is_dir():
+            shutil.rmtree(aside, ignore_errors=True)
+        else:
+            aside.unlink(missing_ok=True)
+
+
+def _copy_durably(source: Path, to: Path) -> None:
+    with source.open("rb") as read, open(to, "xb", opener=_private) as file:
+        shutil.copyfileobj(read, file, _COPY_BYTES)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _private(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_CLOEXEC, 0o600)
 
 
 def _check_room(root: Path, wanted: list[Wanted]) -> None:
@@ -165,7 +222,8 @@ def _remove_staging(root: Path, keep: Collection[str] = ()) -> None:
             if folder.name not in keep:
                 shutil.rmtree(folder, ignore_errors=True)
         if not keep:
-            staging.rmdir()
+            with suppress(OSError):  # something else lies there
+                staging.rmdir()
 
 
 def _done(wanted: Wanted) -> Done:

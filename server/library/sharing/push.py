@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from server.errors import DataDirError, StorageError, TargetError
-from server.library.sharing.catalog import UNCHANGING, VERSIONED, Catalog, read_catalog
+from server.errors import DamagedError, DataDirError, StorageError, TargetError
+from server.library.sharing.catalog import UNCHANGING, VERSIONED, Catalog, damage_of, read_catalog
 from server.library.sharing.local_items import LocalItem, item_of, local_items
 from server.library.sharing.outcome import Done, LeftOut, Outcome, Tell
+from server.library.sharing.proving import prove_own
 from server.library.sharing.reading_ahead import Behind
 from server.library.sharing.shared_items import WORDS, Item, differ, digest_of
-from server.library.sharing.sharing_targets import FolderTarget, Target, blob_path, item_path
+from server.library.sharing.sharing_targets import DAMAGED, FOLDER, ITEMS, FolderTarget, Target, blob_path, item_path
 from server.library.sharing.versions import Versions
 
 STEP = "Sending"
@@ -29,6 +30,8 @@ def push(
     check_apart(root, target)
     catalog = read_catalog(target, tell)
     outcome.left_out += catalog.faults
+    if not dry_run:
+        _set_aside(target, catalog, outcome)
     versions = Versions(root)
     items, left_out = local_items(root)
     outcome.left_out += left_out
@@ -41,7 +44,7 @@ def push(
         outcome.stopped = LeftOut.of(error)
     finally:
         if not dry_run:
-            _save(versions, outcome)
+            save_versions(versions, outcome)
 
 
 def check_apart(root: Path, target: Target) -> None:
@@ -81,8 +84,10 @@ class _Push:
                 tell(STEP, min(1.0, read_bytes / total))
 
             try:
+                if local.kind != "recording":
+                    prove_own(local)
                 self._finish(item_of(local, self._after(local), on_chunk), sent)
-            except StorageError as error:
+            except (StorageError, DamagedError) as error:
                 self._outcome.left_out.append(LeftOut.of(error, local.place))
 
     def _after(self, local: LocalItem) -> tuple[str, ...]:
@@ -104,7 +109,10 @@ class _Push:
         if digest in self._checked:
             return False
         self._checked.add(digest)
-        return digest_of(self._target.read(blob_path(digest), size)) != digest
+        try:
+            return digest_of(self._target.read(blob_path(digest), size)) != digest
+        except TargetError:  # a bad sector; where the whole target has gone, writing it anew says so
+            return True
 
     def _finish(self, read: Item, sent: int) -> None:
         """The item itself, once all that it names is on the target's disk."""
@@ -141,6 +149,18 @@ class _Push:
             self._target.settle()
 
 
+def _set_aside(target: Target, catalog: Catalog, outcome: Outcome) -> None:
+    """Once what it stood for has changed nobody writes an item of that name again. Raises TargetError."""
+    for name in catalog.damaged:
+        if target.set_aside(name):
+            said = outcome.left_out.index(damage_of(name))
+            what = f"The item was damaged, and is set aside in {FOLDER}/{DAMAGED}."
+            advice = "A push from where it came from sends it anew."
+            outcome.left_out[said] = LeftOut(what, f"{ITEMS}/{name[:80]}", advice)
+    if catalog.damaged:
+        target.settle()
+
+
 def _bytes(local: LocalItem) -> int:
     try:
         return sum(local.sizes().values())
@@ -148,7 +168,7 @@ def _bytes(local: LocalItem) -> int:
         return 0
 
 
-def _save(versions: Versions, outcome: Outcome) -> None:
+def save_versions(versions: Versions, outcome: Outcome) -> None:
     """What was sent is sent all the same."""
     try:
         versions.save()

@@ -112,6 +112,9 @@ class Item(BaseModel):
     def bytes(self) -> int:
         return sum(entry.bytes for entry in self.files)
 
+    def file_names(self) -> set[str]:
+        return {entry.name for entry in self.files}
+
     @cached_property
     def content(self) -> str:
         """SHA-256 of what it holds, whatever it is called."""

@@ -16,14 +16,14 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Protocol
-from urllib.parse import unquote, urlsplit
+from urllib.parse import unquote
 
 from server.errors import TargetError
 from server.library.whole_files import TEMPORARY, new_id, sync_directory
 
 FOLDER = "hedgehop-library-1"
 """With the format's number: what a later Hedgehop writes otherwise stands beside it."""
-BLOBS, ITEMS = "blobs", "items"
+BLOBS, ITEMS, DAMAGED = "blobs", "items", "damaged"
 _STALE_S = 24 * 3600.0
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
@@ -46,6 +46,10 @@ class Target(Protocol):
 
     def write(self, path: str, data: bytes) -> None: ...
 
+    def set_aside(self, name: str) -> bool:
+        """Moves a damaged item to ``DAMAGED``; False: it is younger than a day, and may be on its way, or has gone."""
+        ...
+
     def settle(self) -> None:
         """Returns once all that was written would survive a power cut."""
         ...
@@ -64,14 +68,18 @@ def open_target(text: str) -> Target:
     scheme, found, _ = text.partition("://")
     if not found:
         return FolderTarget(Path(text).expanduser().absolute())
-    parts = urlsplit(text)
-    if parts.password is not None or "::" in text:
-        what = "A URL with a password is not taken." if parts.password is not None else "Chained URLs are not taken."
+    host, _, path = text[len(scheme) + 3 :].partition("/")
+    secret = "@" in host or ":" in host or "?" in text
+    if secret or "::" in text:  # by the text alone: a secret with / or ? in it is cut elsewhere by who parses it
+        named = "URLs with a user, a password, a port or a query" if secret else "Chained URLs"
         advice = "Give secrets where the store's own client looks for them: its files, or the environment."
-        raise TargetError(what, where=f"{scheme}://", advice=advice)
-    if scheme == "file":
-        return FolderTarget(Path(unquote(parts.path)).absolute())
-    return StoreTarget(text)
+        raise TargetError(f"{named} are not taken.", where=f"{scheme.rpartition(':')[2]}://", advice=advice)
+    if scheme != "file":
+        return StoreTarget(text)
+    if host not in ("", "localhost"):
+        what, advice = "A file's URL names no host.", "Write file:///folder, or the folder itself."
+        raise TargetError(what, where=text, advice=advice)
+    return FolderTarget(Path(f"/{unquote(path)}").absolute())
 
 
 class FolderTarget:
@@ -86,10 +94,18 @@ class FolderTarget:
         if not folder.is_dir():
             advice = "Check that the disk is there; make the folder if it is to be a new one."
             raise TargetError("There is no such folder.", where=self.text, advice=advice)
+        for path in (self._root, *(self._root / name for name in (BLOBS, ITEMS, DAMAGED))):
+            if path.is_symlink():
+                advice = "Remove the link; links are not followed in a target."
+                raise TargetError("This is a link to elsewhere.", where=str(path), advice=advice)
 
     def sizes(self, folder: str) -> dict[str, int]:
         with _told(self.text):
-            return {entry.name: entry.stat(follow_symlinks=False).st_size for entry in _files(self._root / folder)}
+            return {
+                entry.name: entry.stat(follow_symlinks=False).st_size
+                for entry in _files(self._root / folder)
+                if Path(entry.path) == self._root / _place(folder, entry.name)
+            }
 
     def read(self, path: str, most_bytes: int) -> bytes:
         with _told(self.text):
@@ -125,11 +141,27 @@ class FolderTarget:
     def tidy(self) -> None:
         """Removes what writers left half-written a day ago or earlier; a younger one may still be at work."""
         with _told(self.text):
-            old = [entry for entry in _files(self._root, temporary=True) if _age_s(entry) > _STALE_S]
-            for entry in old:
-                os.unlink(entry.path)
+            for entry in list(_files(self._root, temporary=True)):
+                with contextlib.suppress(OSError):  # another's, or renamed meanwhile
+                    if _age_s(entry.stat(follow_symlinks=False)) > _STALE_S:
+                        os.unlink(entry.path)
+
+    def set_aside(self, name: str) -> bool:
+        item, aside = self._root / item_path(name), self._root / DAMAGED / name
+        with _told(self.text):
+            try:
+                if _age_s(item.lstat()) <= _STALE_S:
+                    return False
+                self._make(aside.parent)
+                os.replace(item, aside)
+            except FileNotFoundError:  # another push was first
+                return False
+        self._unsettled |= {item.parent, aside.parent}
+        return True
 
     def _make(self, folder: Path) -> None:
+        if folder.is_symlink():
+            raise OSError(errno.ELOOP, "A folder is a link to elsewhere", str(folder))
         if folder.is_dir():
             return
         folder.mkdir(parents=True, exist_ok=True)
@@ -172,7 +204,10 @@ class StoreTarget:
                 found = self._fs.find(f"{self._root}/{folder}", detail=True)
             except FileNotFoundError:
                 return {}
-            return {path.rpartition("/")[2]: int(info["size"] or 0) for path, info in found.items()}
+            named = [(path, path.rpartition("/")[2], info) for path, info in found.items()]
+            return {
+                name: int(info["size"] or 0) for path, name, info in named if path.endswith(f"/{_place(folder, name)}")
+            }
 
     def read(self, path: str, most_bytes: int) -> bytes:
         with _told(self.text):
@@ -186,6 +221,19 @@ class StoreTarget:
             except FileNotFoundError:  # a store with real folders; of S3 this would make buckets
                 self._fs.makedirs(place.rpartition("/")[0], exist_ok=True)
                 self._fs.pipe_file(place, data)
+
+    def set_aside(self, name: str) -> bool:
+        item = f"{self._root}/{item_path(name)}"
+        with _told(self.text):
+            try:
+                age_s = time.time() - self._fs.modified(item).timestamp()
+                if age_s <= _STALE_S:
+                    return False
+                self._fs.makedirs(f"{self._root}/{DAMAGED}", exist_ok=True)
+                self._fs.mv(item, f"{self._root}/{DAMAGED}/{name}")
+            except (FileNotFoundError, NotImplementedError):  # another push was first; a store that tells no times
+                return False
+        return True
 
     def settle(self) -> None:
         """A store answers once it has it."""
@@ -203,8 +251,13 @@ def _files(folder: Path, *, temporary: bool = False) -> Iterator[os.DirEntry[str
             yield entry
 
 
-def _age_s(entry: os.DirEntry[str]) -> float:
-    return time.time() - entry.stat(follow_symlinks=False).st_mtime
+def _place(folder: str, name: str) -> str:
+    """Where alone a file of this name counts: a copy beside it is never read."""
+    return blob_path(name) if folder == BLOBS else f"{folder}/{name}"
+
+
+def _age_s(status: os.stat_result) -> float:
+    return time.time() - status.st_mtime
 
 
 def _reason(error: BaseException) -> str:

@@ -44,6 +44,12 @@ class Versions:
         self._changed |= bool(new)
         self._had[key] |= dict.fromkeys(new)
 
+    def begin(self, key: str, contents: Iterable[str]) -> None:
+        """Where nothing stands any more: what stood there was not what the next one is made of."""
+        new = dict.fromkeys(contents)
+        self._changed |= list(new) != list(self._had[key])
+        self._had[key] = new
+
     def save(self) -> None:
         """Raises StorageError."""
         if self._changed:
