@@ -8,17 +8,18 @@ import json
 import math
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from server.library.sharing.versions import pulled_recordings
 from server.library.whole_files import storage_errors
 from server.schemas.station_docs import FIRST_VEHICLE
 from telemetry.errors import RecordingError
 from telemetry.link.audit import END_BYTES
-from telemetry.link.audit_chain import Checked, check_file, parsed
+from telemetry.link.audit_chain import Checked, check_file, log_id, parsed
 from telemetry.link.keys import audit_key_file
 from telemetry.recording.mcap_files.reader import open_recording
 from telemetry.topics.messages import LinkStatus, Topic
@@ -26,10 +27,12 @@ from telemetry.topics.messages import LinkStatus, Topic
 COLUMNS = ("t_utc", "operator", "words", "result")
 ADVICE = "Keep a copy of the log and of the recordings, and find out who could write to the data directory."
 
+_NAMED = 5
+
 
 @dataclass(frozen=True, slots=True)
 class AuditVerdict:
-    """``faults``: nothing of this happens by itself. ``notes``: what was lost without anybody's doing."""
+    """``faults``: nothing of this happens by itself. ``notes``: what was lost by nobody's doing, or not looked at."""
 
     lines: int
     faults: tuple[str, ...]
@@ -56,9 +59,9 @@ def look_through(log: Path, key: bytes, *, report: object = None) -> AuditVerdic
     del report
     with storage_errors(log):
         checked = check_file(log, key)
-        faults = (*_broken(checked), *_missing(log.parent, checked))
-    notes = tuple(_torn(line, is_last=line == checked.lines) for line in checked.torn)
-    return AuditVerdict(checked.lines, faults, notes, time.time())
+        missing, others = _missing(log.parent, checked, log_id(key))
+    torn = (_torn(line, is_last=line == checked.lines) for line in checked.torn)
+    return AuditVerdict(checked.lines, (*_broken(checked), *missing), (*torn, *others), time.time())
 
 
 def joined(verdicts: Mapping[int, AuditVerdict]) -> AuditVerdict:
@@ -129,18 +132,38 @@ def _torn(line: int, *, is_last: bool) -> str:
     return f"The entry of line {line} was cut off by a power cut. The chain goes on behind it."
 
 
-def _missing(folder: Path, checked: Checked) -> Iterator[str]:
-    """Lines that a recording of this machine knew and the log has not any more. Behind a break nothing can be told."""
+def _missing(folder: Path, checked: Checked, own_id: str) -> tuple[list[str], list[str]]:
+    """Faults: lines that a recording of this machine knew and the log has not any more. Notes: what was not looked at.
+
+    A recording that says it is of this log is held against it, whatever else is told; one that says another log, or
+    none, is passed over only where it was pulled. Behind a break nothing can be told.
+    """
     if checked.broken is not None:
-        return
+        return [], []
     aside = (line for path in folder.glob("audit-until-*.jsonl") for line in path.read_bytes().splitlines())
     known = checked.hashes | {(parsed(line) or {}).get("hash") for line in aside}
+    pulled, faults, others = pulled_recordings(folder), list[str](), list[str]()
     for path in sorted((folder / "recordings").glob("*.mcap")):
-        try:
-            with open_recording(path) as recording:
-                last = recording.latest(Topic.LINK, recording.end_utc_s)
-        except RecordingError:
-            continue  # it has its own words in Review
-        status = None if last is None else last.message
-        if isinstance(status, LinkStatus) and status.audit_head.strip("0") and status.audit_head not in known:
-            yield f"LINES ARE MISSING: {path.name} was recorded when the log had a line that it has not any more."
+        status = _last_status(path)
+        if status is None or not status.audit_head.strip("0") or status.audit_head in known:
+            continue
+        if status.audit_log in ("", own_id):
+            why = "was recorded when the log had a line that it has not any more."
+        else:
+            why = "was recorded beside another log: it was copied here by hand, or this machine's key was replaced."
+        if status.audit_log != own_id and path.name in pulled:
+            others.append(path.name)
+        else:
+            faults.append(f"LINES ARE MISSING: {path.name} {why}")
+    names = ", ".join(others[:_NAMED]) + (f" and {len(others) - _NAMED} more" if len(others) > _NAMED else "")
+    return faults, [f"Pulled, and not held against this log: {names}."] if others else []
+
+
+def _last_status(path: Path) -> LinkStatus | None:
+    """None: it has none, or it cannot be read, which has its own words in Review."""
+    try:
+        with open_recording(path) as recording:
+            last = recording.latest(Topic.LINK, recording.end_utc_s)
+    except RecordingError:
+        return None
+    return last.message if last is not None and isinstance(last.message, LinkStatus) else None

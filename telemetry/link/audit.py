@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from telemetry.errors import RecordingError, RecordingFullError, TelemetryError
-from telemetry.link.audit_chain import FIRST, chained, check_file, parsed
+from telemetry.link.audit_chain import FIRST, chained, check_file, log_id, parsed
 from telemetry.link.keys import write_key_file
 from telemetry.topics.messages import CommandRecord
 from telemetry.topics.requests import Operator
@@ -49,11 +49,13 @@ def open_audit(path: Path, key_file: Path) -> AuditLog:
 class AuditLog:
     """Appends to ``path``, which is made if it is missing. All calls wait for the disk: not for an event loop.
 
-    ``head`` is the last line's hash; new lines follow it, whatever ``check`` finds. ``note``: to be told to people.
+    ``head`` is the last line's hash; new lines follow it, whatever ``check`` finds. ``id``: the same as long as the key
+    is. ``note``: to be told to people.
     """
 
     def __init__(self, path: Path, key: bytes = b"", *, note: str = "") -> None:
         self._path, self._key, self.note = path, key, note
+        self.id = log_id(key)
         flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC
         try:
             self._file = os.open(path, flags, 0o600)
@@ -144,6 +146,7 @@ class Audit(Protocol):
     """``AuditLog``: it waits for the disk."""
 
     head: str
+    id: str
 
     def check(self) -> str: ...
     def write(self, record: CommandRecord) -> object: ...
@@ -166,6 +169,10 @@ class CommandLog:
     @property
     def head(self) -> str:
         return "" if self._audit is None else self._audit.head
+
+    @property
+    def log_id(self) -> str:
+        return "" if self._audit is None else self._audit.id
 
     async def check(self) -> None:
         """Of a log that may be long: beside what is written to it."""

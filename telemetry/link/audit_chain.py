@@ -44,6 +44,11 @@ class Checked:
     """Lines of which a power cut has left the beginning; their entries are lost."""
 
 
+def log_id(key: bytes) -> str:
+    """Which log it is, as each recording says it; empty without a key. It tells nothing of the key."""
+    return hmac.new(key, b"hedgehop audit log", hashlib.sha256).hexdigest() if key else ""
+
+
 def check_chain(content: bytes, key: bytes = b"") -> Broken | None:
     """Where the chain of an audit log's content is broken first; None: every line is as it was written."""
     return check_lines(io.BytesIO(content), key).broken

@@ -356,6 +356,7 @@ class Link:
                 *([self.commands.trouble] if self.commands.trouble else []),
             ),
             audit_head=self.commands.head,
+            audit_log=self.commands.log_id,
             ways=vehicle.ways.status(now_s) if vehicle else (),
         )
 

@@ -179,6 +179,8 @@ class LinkStatus:
     signing: SigningStatus = field(default_factory=SigningStatus)
     audit_head: str = ""
     """Hash of the audit log's last line: each recording holds it, so that lines removed from the end are missed."""
+    audit_log: str = ""
+    """Which log that is (``telemetry.link.audit_chain.log_id``); empty of recordings from before it was told."""
     ways: tuple[WayStatus, ...] = ()
     """To the adopted vehicle; ``quality`` and ``round_trip_s`` are those of the one in use."""
 

@@ -5,12 +5,17 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
-from server.library.audit_log import newest_of
+import pytest
+
+from server.library.audit_log import AuditVerdict, look_through, newest_of, read_key
+from server.library.sharing.sharing_targets import FolderTarget
 from telemetry.link.audit import open_audit
+from telemetry.link.audit_chain import log_id
 from telemetry.link.keys import audit_key_file
 from telemetry.recording.mcap_files.writer import RecordingWriter
 from telemetry.topics.messages import CommandRecord, LinkStatus, Topic
 from tests.server.cli_runs import hedgehop
+from tests.server.sharing_library import bring, send
 
 
 def log_in(folder: Path, *words: str) -> str:
@@ -53,6 +58,55 @@ def test_lines_taken_from_the_end_are_missed_by_the_recording_that_has_seen_them
     ran = hedgehop("audit", tmp_path)
     assert ran.code == 1
     assert "LINES ARE MISSING: flight.mcap" in ran.out + ran.err
+
+
+def recorded(path: Path, head: str, log: str) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    writer = RecordingWriter(path, t_utc_s=1.0, t_mono_s=0.0)
+    writer.write(Topic.LINK, LinkStatus(1.0, audit_head=head, audit_log=log), 2.0)
+    writer.close()
+    return path
+
+
+def verdict_of(folder: Path) -> AuditVerdict:
+    return look_through(folder / "audit.jsonl", read_key(folder))
+
+
+@pytest.mark.parametrize("says", ["its log", "no log"])
+def test_pulled_recordings_of_another_machine_are_no_alarm(tmp_path: Path, says: str) -> None:
+    one, two, stick = tmp_path / "one", tmp_path / "two", tmp_path / "stick"
+    stick.mkdir()
+    for folder in (one, two):
+        log_in(folder, "arm", folder.name)
+    head = newest_of([one / "audit.jsonl"], 1)[0]["hash"]
+    recorded(one / "recordings" / "flight.mcap", head, log_id(read_key(one)) if says == "its log" else "")
+    assert send(one, FolderTarget(stick)).whole
+    assert bring(two, FolderTarget(stick)).whole
+    verdict = verdict_of(two)
+    assert verdict.faults == ()
+    assert verdict.notes == ("Pulled, and not held against this log: flight.mcap.",)
+    assert verdict_of(one).sentences == ("The audit log is whole: 3 lines.",)
+
+
+def test_no_list_keeps_a_recording_of_this_machine_from_being_held_against_its_log(tmp_path: Path) -> None:
+    head = log_in(tmp_path, "arm", "start")
+    recorded(tmp_path / "recordings" / "flight.mcap", head, log_id(read_key(tmp_path)))
+    (tmp_path / "shared-versions.json").write_text('{"pulled": ["flight.mcap"]}', encoding="utf-8")
+    assert verdict_of(tmp_path).faults == ()
+    log = tmp_path / "audit.jsonl"
+    log.write_bytes(b"".join(log.read_bytes().splitlines(keepends=True)[:-1]))
+    (fault,) = verdict_of(tmp_path).faults
+    assert "LINES ARE MISSING: flight.mcap" in fault
+
+
+def test_a_key_and_log_that_were_begun_anew_are_missed(tmp_path: Path) -> None:
+    head = log_in(tmp_path, "arm", "start")
+    recorded(tmp_path / "recordings" / "flight.mcap", head, log_id(read_key(tmp_path)))
+    (tmp_path / "audit.jsonl").unlink()
+    audit_key_file(tmp_path).unlink()
+    log_in(tmp_path, "land")
+    (fault,) = verdict_of(tmp_path).faults
+    assert "or this machine's key was replaced" in fault
 
 
 def test_nothing_to_look_at_is_said(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from tests.telemetry.own_time import run
 class Disk:
     """Takes the place of the audit log."""
 
-    head = "h"
+    head, id = "h", "i"
 
     def check(self) -> str:
         return ""
@@ -113,7 +113,7 @@ def test_what_came_of_each_command_is_written_down_too() -> None:
             ((words, result),) = disk.results
             assert words == "arm"
             assert result.startswith("not done: ")
-            await until(lambda: bench.status.audit_head == "h")
+            await until(lambda: (bench.status.audit_head, bench.status.audit_log) == ("h", "i"))
 
     run(whole)
 

@@ -193,7 +193,7 @@ class SlowDisk:
     def __init__(self) -> None:
         self.goes_on = threading.Event()
 
-    head = ""
+    head = id = ""
 
     def check(self) -> str:
         return ""

@@ -378,6 +378,7 @@ export interface LinkStatus {
   again: Candidate | null;
   signing: SigningStatus;
   audit_head: string;
+  audit_log: string;
   ways: WayStatus[];
 }
 

@@ -67,6 +67,8 @@ def _pull(root: Path, target: Target, catalog: Catalog, outcome: Outcome, tell: 
     for each in wanted:
         if each.item.key in here.taken and each.name == each.item.name:
             versions.begin(each.item.key, [*each.item.after, each.item.content])
+        if each.item.kind == "recording":
+            versions.add_pulled(each.name)
     save_versions(versions, outcome)  # before: a pull that is killed has then forgotten nothing
     try:
         unread = _bring_all(root, target, wanted, versions, outcome, tell)

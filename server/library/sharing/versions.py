@@ -1,4 +1,5 @@
-"""Which versions of each thing this machine has had: what is changed here says what it was made of.
+"""Which versions of each thing this machine has had, so that what is changed here says what it was made of; and which
+recordings were pulled.
 
 Without this file, of a new or restored data directory, nothing is lost: an old version is then brought beside the new.
 """
@@ -24,6 +25,7 @@ class _Kept(BaseModel):
 
     format: int = 1
     versions: dict[str, list[Digest]] = {}
+    pulled: list[str] = []
 
 
 class Versions:
@@ -33,7 +35,9 @@ class Versions:
         self._file = root / FILE
         self._had: dict[str, dict[str, None]] = defaultdict(dict)
         self._changed = False
-        for key, contents in _read(self._file).items():
+        kept = _read(self._file)
+        self._pulled = dict.fromkeys(kept.pulled)
+        for key, contents in kept.versions.items():
             self._had[key] = dict.fromkeys(contents)
 
     def had(self, key: str) -> tuple[str, ...]:
@@ -50,17 +54,27 @@ class Versions:
         self._changed |= list(new) != list(self._had[key])
         self._had[key] = new
 
+    def add_pulled(self, name: str) -> None:
+        """A recording that comes from another machine, or comes back."""
+        self._changed |= name not in self._pulled
+        self._pulled[name] = None
+
     def save(self) -> None:
         """Raises StorageError."""
         if self._changed:
             kept = {key: list(contents)[-MOST_VERSIONS:] for key, contents in self._had.items() if contents}
-            write_atomically(self._file, _Kept(versions=kept).model_dump_json().encode())
+            write_atomically(self._file, _Kept(versions=kept, pulled=list(self._pulled)).model_dump_json().encode())
             self._changed = False
 
 
-def _read(file: Path) -> dict[str, list[str]]:
+def pulled_recordings(root: Path) -> frozenset[str]:
+    """File names of recordings that were pulled. Raises StorageError."""
+    return frozenset(_read(root / FILE).pulled)
+
+
+def _read(file: Path) -> _Kept:
     try:
         with storage_errors(file):
-            return _Kept.model_validate_json(file.read_bytes()).versions if file.is_file() else {}
+            return _Kept.model_validate_json(file.read_bytes()) if file.is_file() else _Kept()
     except ValidationError:
-        return {}
+        return _Kept()
