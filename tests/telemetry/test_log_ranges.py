@@ -19,6 +19,7 @@ from telemetry.perception.rebuilding.range_flight import RangeFlight, write_rang
 from telemetry.perception.rebuilding.rebuild import rebuild
 from telemetry.perception.sensor_kinds import RANGES
 from telemetry.recording.mcap_files.reader import open_recording
+from telemetry.recording.vehicle_logs.dataflash_ranges import read_dataflash_ranges
 from telemetry.topics.messages import Topic
 from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.own_logs import dataflash, ulog
@@ -158,6 +159,24 @@ def test_sectors_of_ardupilot_where_the_farthest_is_nothing(tmp_path: Path, name
     np.testing.assert_allclose(points_of(out), [[5.0, 0.0, UP_M], [0.0, 2.0 + ahead_m, UP_M + up_m]], atol=0.02)
     assert any("PRX_LOG_RAW" in note for note in told.notes) == (name == "PRX")
     assert any("45° wide" in note for note in told.notes)
+
+
+FAR = {
+    "one limit": ([[40.0] * 8] * 60 + [[12.0, *[40.0] * 7]] * 5, ""),
+    "one limit and a wall near by": ([[40.0] * 7 + [5.0]] * 60, ""),
+    "two limits": ([[40.0] * 8] * 60 + [[20.0] * 8] * 60, "20 m 480 times"),
+    "a lower limit for a while": ([[40.0] * 8] * 60 + [[20.0] * 8] * 6, "20 m 48 times"),
+    "never nothing": ([[6.0 + 0.01 * (k % 50 + sector) for sector in range(8)] for k in range(120)], "if 6.56 m was"),
+}
+
+
+@pytest.mark.parametrize("which", FAR)
+def test_a_farthest_that_is_not_clearly_nothing_is_said(tmp_path: Path, which: str) -> None:
+    distances, words = FAR[which]
+    found = read_dataflash_ranges(with_proximity(dataflash_of(Flight()), "PRXR", [(2, row) for row in distances]))
+    said = [note for note in found.notes if "taken for nothing" in note]
+    assert len(said) == bool(words)
+    assert words in " ".join(said)
 
 
 def test_a_ground_stations_log_with_a_companions_sensor(tmp_path: Path) -> None:

@@ -29,6 +29,8 @@ _SECTORS = ("D0", "D45", "D90", "D135", "D180", "D225", "D270", "D315")
 _SECTOR_RAD, _LAYER_RAD, _LEVEL_LAYER = math.radians(45.0), math.radians(30.0), 2
 _LAYERS = range(5)
 _NEAREST_M = 0.1
+_FAR_SHARE, _CLEARLY = 0.25, 20
+"""What is told for nothing is told so many times as often as any other distance beyond this share of it."""
 _COARSE = (
     "PRX and PRXR tell the nearest thing of a sector 45° wide and 30° high, up to 1 s old: it may stand up to half of "
     "that, and as far as was flown meanwhile, beside where the map has it."
@@ -111,6 +113,7 @@ def _layers(rows: Rows, t_s: F64, name: str, found: LoggedRanges) -> None:
     layers = rows.column("Layer") if rows.has("Layer") else np.full(len(rows), float(_LEVEL_LAYER))
     is_healthy = rows.column("He", "Health")
     nothing_m = _nothing_m(distances_m)
+    found.notes += _doubts(distances_m, nothing_m, name)
     for t, layer, health, row_m in zip(t_s.tolist(), layers.tolist(), is_healthy.tolist(), distances_m, strict=True):
         if name == FILTERED and health != _HEALTHY:
             found.not_valid[f"{name}: not healthy"] += 1
@@ -125,6 +128,20 @@ def _nothing_m(distances_m: F64) -> float:
     values, counts = np.unique(distances_m[np.isfinite(distances_m)], return_counts=True)
     again = values[counts > 1]
     return float(again[-1]) if len(again) else math.inf
+
+
+def _doubts(distances_m: F64, nothing_m: float, name: str) -> list[str]:
+    """Whether another distance may stand for nothing, as where a limit was changed or nothing is never told."""
+    far_m = distances_m[np.isfinite(distances_m) & (distances_m > _FAR_SHARE * nothing_m) & (distances_m <= nothing_m)]
+    values, counts = np.unique(far_m, return_counts=True)
+    if len(values) < 2 or int(counts[-1]) >= _CLEARLY * int(counts[:-1].max()):
+        return []
+    most = int(np.argmax(counts[:-1]))
+    return [
+        f"{name}: {nothing_m:g} m, the farthest that was told twice, is taken for nothing seen. It was told "
+        f"{counts[-1]} times and {values[most]:g} m {counts[most]} times: if that stood for nothing too, what the map "
+        f"has there is not real; if {nothing_m:g} m was measured, what stood there and beyond is missing."
+    ]
 
 
 def _layer(distances_m: list[float], layer: float, nothing_m: float) -> Scan:
