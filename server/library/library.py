@@ -34,7 +34,7 @@ from server.schemas.station_docs import FIRST_VEHICLE
 
 VEHICLES = "vehicles"
 """What is kept of each vehicle but the first one, whose things lie in the data directory itself."""
-_SEEN = "seen-"
+SEEN = "seen-"
 _KEPT_IN = (f"{plans.FOLDER}/**/*.json", "set-aside/**/*.json", "*.json", "run/*.json", f"{VEHICLES}/**/*.json")
 """Plans with all their undo steps, damaged ones that were set aside, and what is on board of a vehicle."""
 _LAST_PLAN = "last-plan"
@@ -289,8 +289,8 @@ def remove_unneeded(root: Path) -> list[Path]:
     """
     with storage_errors(root):
         folders = [folder for folder in (root / terrains.FOLDER).iterdir() if folder.is_dir()]
-        files = [path for folder in folders for path in folder.glob(f"{_SEEN}*.npz")]
-        left = _not_named(files, (path.read_bytes() for pattern in _KEPT_IN for path in root.glob(pattern)))
+        files = [path for folder in folders for path in folder.glob(f"{SEEN}*.npz")]
+        left = _not_named(files, kept_texts(root))
         for path in left:
             path.unlink()
         for folder in folders:
@@ -298,8 +298,13 @@ def remove_unneeded(root: Path) -> list[Path]:
     return left
 
 
+def kept_texts(root: Path) -> Iterator[bytes]:
+    """In which the id of what was seen stands as long as it is needed. Raises OSError."""
+    return (path.read_bytes() for pattern in _KEPT_IN for path in root.glob(pattern))
+
+
 def _not_named(files: list[Path], texts: Iterator[bytes]) -> list[Path]:
-    left = {path.stem.removeprefix(_SEEN).encode(): path for path in files}
+    left = {path.stem.removeprefix(SEEN).encode(): path for path in files}
     while left and (text := next(texts, None)) is not None:
         left = {seen_id: path for seen_id, path in left.items() if seen_id not in text}
     return list(left.values())

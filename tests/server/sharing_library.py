@@ -59,9 +59,11 @@ def add_radar(root: Path, data: bytes = b"samples") -> str:
     return RadarShelf(root, lambda error: None).add(upload, "capture.npy").id
 
 
-def write_plan(root: Path, name: str, *, plan_id: str = PLAN_ID, terrain_id: str | None = None) -> Path:
+def write_plan(
+    root: Path, name: str, *, plan_id: str = PLAN_ID, terrain_id: str | None = None, seen_id: str | None = None
+) -> Path:
     (root / "plans").mkdir(parents=True, exist_ok=True)
-    save_plan(root / "plans" / plan_id, History([PlanDoc(name=name, terrain_id=terrain_id)]))
+    save_plan(root / "plans" / plan_id, History([PlanDoc(name=name, terrain_id=terrain_id, seen_id=seen_id)]))
     return root / "plans" / plan_id / "manifest.json"
 
 
@@ -73,7 +75,7 @@ def full_library(root: Path) -> None:
     add_recording(root, "flight.mcap", closed_mcap(b"a flight"))
     add_recording(root, "other.tlog", b"another station's")
     add_recording(root / "vehicles" / "2", "second.bin", b"of the second vehicle")
-    write_plan(root, "Slope", terrain_id=terrain_id)
+    write_plan(root, "Slope", terrain_id=terrain_id, seen_id="0123456789abcdef")
 
 
 def send(root: Path, target: Target, *, dry_run: bool = False, check: bool = False) -> Outcome:

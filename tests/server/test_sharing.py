@@ -201,12 +201,14 @@ def test_a_model_takes_what_was_seen_elsewhere_and_keeps_its_own(tmp_path: Path,
     mine, theirs = (root / "terrains" / terrain for root in (one, two))
     (mine / "seen-1111111111111111.npz").write_bytes(b"by one")
     (theirs / "seen-2222222222222222.npz").write_bytes(b"by two")
+    write_plan(one, "By one", plan_id="feedc0de00000002", seen_id="1111111111111111")
+    write_plan(two, "By two", plan_id="feedc0de00000003", seen_id="2222222222222222")
     send(one, stick)
     bring(two, stick)
     send(two, stick)
     bring(one, stick)
     assert shared_files(one) == shared_files(two)
-    assert len(shared_files(one)) == 4
+    assert len(shared_files(one)) == 6
     heights = (mine / "elevation.npy").read_bytes()
     (mine / "elevation.npy").write_bytes(heights[:-1] + bytes([heights[-1] ^ 1]))
     before = shared_files(one)

@@ -23,7 +23,7 @@ _SHORT, _ID = 8, 16
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """``files``: those that are missing here."""
+    """``files``: those that are missing here and needed."""
 
     item: Item
     name: str

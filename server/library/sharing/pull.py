@@ -18,6 +18,7 @@ from server.library.sharing.local_items import FOLDERS, local_items
 from server.library.sharing.outcome import Done, LeftOut, Outcome, Tell
 from server.library.sharing.proving import prove
 from server.library.sharing.push import check_apart, save_versions
+from server.library.sharing.seen_wanted import with_needed_columns
 from server.library.sharing.shared_items import WORDS
 from server.library.sharing.sharing_targets import ITEMS, Target
 from server.library.sharing.versions import Versions
@@ -56,7 +57,7 @@ def _pull(root: Path, target: Target, catalog: Catalog, outcome: Outcome, tell: 
     for item in catalog.items:
         if here.held.get(item.key) == item.content:
             versions.add(item.key, [*item.after, item.content])
-    wanted = choose(catalog, here, root, versions, outcome)
+    wanted = with_needed_columns(root, target, choose(catalog, here, root, versions, outcome), outcome)
     if dry_run:
         for each in wanted:
             outcome.done.append(_done(each))
@@ -134,7 +135,7 @@ def _bring(root: Path, staging: Path, target: Target, wanted: Wanted, on_chunk: 
     adding = item.kind != "recording" and place.is_dir()
     staging.mkdir(mode=0o700, parents=True, exist_ok=True)
     shelf.mkdir(mode=0o700, exist_ok=True)
-    for entry in wanted.files if adding else item.files:
+    for entry in wanted.files:
         fetch_file(target, entry, staging / entry.name, on_chunk)
     if item.kind == "recording":
         prove(item, staging)
