@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import io
+import itertools
 import json
 import os
 import shutil
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 
 from server.errors import StorageError, StorageFullError, TargetError
-from server.library.sharing import local_items, pull, push, shared_items, versions
+from server.library.sharing import local_items, pull, push, shared_items, sharing_targets, versions
 from server.library.sharing.sharing_targets import BLOBS, DAMAGED, FOLDER, ITEMS, FolderTarget, Target, open_target
 from server.library.stored_arrays import read_array
 from tests.server.sharing_library import (
@@ -159,13 +160,11 @@ class Unreadable(FolderTarget):
 
     def __init__(self, folder: Path, number: int) -> None:
         super().__init__(folder)
-        self._left = number
+        self._number, self._reads = number, itertools.count(1)
 
     def read(self, path: str, most_bytes: int) -> bytes:
-        if path.startswith(BLOBS):
-            self._left -= 1
-            if self._left == 0:
-                raise TargetError("Input/output error.", where=self.text)
+        if path.startswith(BLOBS) and next(self._reads) == self._number:
+            raise TargetError("Input/output error.", where=self.text)
         return super().read(path, most_bytes)
 
 
@@ -233,6 +232,18 @@ def test_a_torn_item_is_set_aside_once_it_is_old_and_all_is_well_again(tmp_path:
     assert send(one, stick).whole
     assert bring(tmp_path / "two", stick).whole
     assert _plans(tmp_path / "two") == ["V2"]
+
+
+def test_setting_aside_waits_for_who_may_be_writing_and_survives_who_was_first(
+    target: Target, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target.write(f"{ITEMS}/torn.json", b"torn")
+    assert not target.set_aside("torn.json")
+    monkeypatch.setattr(sharing_targets, "_STALE_S", -1.0)
+    assert target.set_aside("torn.json")
+    assert not target.set_aside("torn.json")
+    target.settle()
+    assert (target.sizes(ITEMS), target.sizes(DAMAGED)) == ({}, {"torn.json": 4})
 
 
 def test_a_full_disk_keeps_the_account_of_what_was_brought(

@@ -94,10 +94,11 @@ class FolderTarget:
         if not folder.is_dir():
             advice = "Check that the disk is there; make the folder if it is to be a new one."
             raise TargetError("There is no such folder.", where=self.text, advice=advice)
-        for path in (self._root, *(self._root / name for name in (BLOBS, ITEMS, DAMAGED))):
-            if path.is_symlink():
-                advice = "Remove the link; links are not followed in a target."
-                raise TargetError("This is a link to elsewhere.", where=str(path), advice=advice)
+        with _told(self.text):
+            for path in (self._root, *(self._root / name for name in (BLOBS, ITEMS, DAMAGED))):
+                if path.is_symlink():
+                    advice = "Remove the link; links are not followed in a target."
+                    raise TargetError("This is a link to elsewhere.", where=str(path), advice=advice)
 
     def sizes(self, folder: str) -> dict[str, int]:
         with _told(self.text):
