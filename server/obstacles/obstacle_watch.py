@@ -130,7 +130,8 @@ class Watch:
         self.awaited.discard(sensor)
         for name in _filled(status):
             if self.mirrors[name].origin is None:
-                self.mirrors[name].expect(status.t_mono_s, "" if status.basis is None else status.basis.run)
+                run = "" if status.basis is None else status.basis.run
+                self.mirrors[name].expect(status.t_mono_s, run, status.clear_count)
                 self._tell_kept()
         if any(self._is_left_incomplete(name, now_s) for name in MAP_NAMES if sensor_of(name) == sensor):
             self.needs_whole[sensor].set()

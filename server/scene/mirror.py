@@ -90,7 +90,7 @@ class MapMirror:
     _lacks: bool = False
     """Something before the newest delta is missing: only the whole map mends that."""
     _untold_mono_s: float = -math.inf
-    """Newest word of a map of which nothing has come; inf: what there was is emptied by order."""
+    """Newest word of a map of which nothing has come."""
     _untold_run: str = ""
     """Of the node that said it."""
     _chunks: dict[ChunkKey, Chunk] = field(default_factory=dict)
@@ -133,22 +133,25 @@ class MapMirror:
             self._clear_count = clear_count
             self._empty()
             self._before_mono_s = None  # a map that was emptied goes on as what it was
-            self._untold_mono_s = math.inf
             self._kept.forget()
             self._count()
 
-    def expect(self, t_mono_s: float, run: str = "") -> None:
+    def expect(self, t_mono_s: float, run: str = "", clear_count: int = 0) -> None:
         """Its node says that it holds something; if nothing of it was heard, that is missing. ``t_mono_s``: of the
         newest frame in it; ``run``: of the node, "" where it does not say. Another run: what the one before held died
-        with it."""
+        with it. ``clear_count``: as in a delta; what is void is not lost, but nothing is known before its node answers
+        the order."""
         with self._lock:
             if self.origin is not None:
                 return
-            if run and self._untold_run and run != self._untold_run:
-                self._lose_untold()
-            self._lacks, self._untold_run = True, run or self._untold_run
-            self._untold_mono_s = max(self._untold_mono_s, t_mono_s)
-            self._count()
+            before, self._lacks = (self._lacks, self._kept.is_over_full), True
+            if self._clear_count in (None, clear_count):
+                if run and self._untold_run and run != self._untold_run:
+                    self._lose_untold()
+                self._untold_run = run or self._untold_run
+                self._untold_mono_s = max(self._untold_mono_s, t_mono_s)
+            if before != (True, self._kept.is_over_full):
+                self._count()
 
     def fold(self, delta: MapDelta) -> bool:
         """Whether nothing is missing before it. Raises ValueError when the delta's arrays do not belong together."""

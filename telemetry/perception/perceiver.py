@@ -146,7 +146,14 @@ class Perceiver:
     def _tell(self, result: FrameResult, done_s: float, basis: Basis | None) -> Outcome[PerceptionStatus]:
         dropped = Counter(self.perception.dropped) + self._dropped
         return self._teller.outcome(
-            result, self.perception, self.where, dropped=dropped, done_s=done_s, basis=basis, conflict=self.conflict
+            result,
+            self.perception,
+            self.where,
+            dropped=dropped,
+            done_s=done_s,
+            basis=basis,
+            conflict=self.conflict,
+            clear_count=self.settings.clear_count,
         )
 
     # What is known

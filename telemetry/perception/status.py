@@ -65,6 +65,7 @@ class Teller:
         done_s: float,
         basis: Basis | None,
         conflict: MissionConflict | None,
+        clear_count: int,
     ) -> Outcome[PerceptionStatus]:
         if result.accepted:
             self._latencies.append(done_s - result.t_mono_s)
@@ -88,6 +89,7 @@ class Teller:
             voxels_explained=the_map.explained_count,
             map_bytes=the_map.size_bytes,
             map_revision=the_map.revision,
+            clear_count=clear_count,
             origin=where.origin,
             region=None if result.region is None else Region(**asdict(result.region)),
             corridor_m=result.corridor_m,

@@ -204,6 +204,8 @@ class PerceptionStatus:
     voxels_explained: int = 0
     map_bytes: int = 0
     map_revision: int = 0
+    clear_count: int = 0
+    """As ``MapDelta.clear_count``."""
     origin: MapOrigin | None = None
     region: Region | None = None
     corridor_m: float = 0.0

@@ -94,6 +94,8 @@ def test_an_order_empties_the_map_and_what_is_kept(tmp_path: Path, *, is_restart
         assert await station.sees() == 0
         mirror = station.watch.mirrors["radar"]
         assert (mirror.kept_count, mirror.has_forgotten, mirror.is_complete) == (0, False, True)
+        said = node.worker.perceiver.tick(lambda: node.now_s, feed=True).status
+        assert said.clear_count == station.published[-1].clear_count
         node.fly(10.0, 11.0)
         await station.hears(node)
         assert await station.sees() > 0, "what is seen after the order counts"

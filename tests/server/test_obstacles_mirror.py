@@ -356,6 +356,31 @@ def test_of_what_was_emptied_by_order_nothing_is_lost_however_late_its_node_answ
     assert (mirror.has_forgotten, kept_in(mirror)) == (False, {CRANE})
 
 
+@pytest.mark.parametrize("how", ["another run says so", "another map is told"])
+def test_what_was_seen_after_the_maps_were_emptied_and_died_unheard_is_said_to_be_lost(how: str) -> None:
+    mirror = in_flight()
+    mirror.dismiss(1)
+    mirror.expect(20.0, "a", 0)
+    mirror.expect(28.0, "a", 1)
+    if how == "another run says so":
+        mirror.expect(28.5, "b", 1)
+    mirror.fold(delta([CRANE], whole=True, began_mono_s=31.0 if how == "another map is told" else 28.5, clear_count=1))
+    assert (mirror.has_forgotten, kept_in(mirror)) == (True, {CRANE})
+    mirror.dismiss(2)
+    assert not mirror.has_forgotten, "the operator's way out"
+
+
+def test_words_of_a_map_that_change_nothing_are_no_other_map() -> None:
+    mirror = MapMirror("radar")
+    mirror.on_flight(flies=True)
+    before = mirror.folds
+    folds = list[int]()
+    for t_mono_s, run in ((10.0, "a"), (11.0, "a"), (12.0, ""), (13.0, "a"), (14.0, "b"), (15.0, "b"), (16.0, "c")):
+        mirror.expect(t_mono_s, run)
+        folds.append(mirror.folds - before)
+    assert folds == [1, 1, 1, 1, 2, 2, 2], "something is missing; something is lost"
+
+
 def test_what_does_not_belong_together_is_refused_and_absurd_keys_are_left_out() -> None:
     mirror = MapMirror("radar")
     broken = delta([(0, 0, 0), (1, 0, 0)])

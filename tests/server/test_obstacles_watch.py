@@ -361,6 +361,13 @@ def test_a_map_that_died_unheard_is_said_to_be_lost() -> None:
         await watch.on_map(delta(CRANE, whole=True, began_mono_s=9.0))
         with pytest.raises(NotReadyError, match="not all that it had seen could be kept"):
             await seen_maps(watch)
+        await watch.dismiss(1)
+        for t_mono_s, clear_count in ((20.0, 0), (21.0, 1)):
+            said = Basis(t_mono_s, run="b")
+            watch.on_status(status(voxels_occupied=3, clear_count=clear_count, basis=said))
+            assert not watch.mirrors["radar"].has_forgotten
+        watch.on_status(status(voxels_occupied=1, clear_count=1, basis=Basis(24.0, run="c")))
+        assert watch.mirrors["radar"].has_forgotten, "seen since the maps were emptied"
 
     asyncio.run(scenario())
 

@@ -477,6 +477,7 @@ export interface PerceptionStatus {
   voxels_explained: number;
   map_bytes: number;
   map_revision: number;
+  clear_count: number;
   origin: MapOrigin | null;
   region: Region | null;
   corridor_m: number;

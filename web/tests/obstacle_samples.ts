@@ -77,6 +77,7 @@ export function perception(fields: Partial<PerceptionStatus> = {}): PerceptionSt
     voxels_explained: 220,
     map_bytes: 1e6,
     map_revision: 3,
+    clear_count: 0,
     origin: null,
     region: null,
     corridor_m: 24,
