@@ -82,7 +82,10 @@ class MapMirror:
     """As the sensor's node says it."""
     _flies: bool = False
     _before_mono_s: float | None = None
-    """Beginning of the map that was here when a flight was over last: however often that is told again, it is of it."""
+    """Beginning of the map that was here when a flight was over last: however often that is told again, it is of it,
+    until something is seen in it in the next flight."""
+    _before_revision: int = 0
+    """The newest of that map that was told before the next flight."""
     _clear_count: int | None = None
     """Of the order by which all maps were emptied last: what was told before it is void. None: none was given."""
     _parts_in: int = 0
@@ -120,7 +123,7 @@ class MapMirror:
                 self._flies = flies
                 self._kept.forget()
                 if not flies and self.origin is not None:
-                    self._before_mono_s = self._began_mono_s
+                    self._before_mono_s, self._before_revision = self._began_mono_s, self.revision
                 self._expect_nothing()  # what was waited for is of before
                 if not flies and not self.is_complete:
                     self._empty()
@@ -166,6 +169,7 @@ class MapMirror:
                 return True
             follows, is_first = self._follows(delta), delta.whole and delta.part == 0
             self._begin(delta, is_first=is_first)
+            self._note_flight(delta, keys[sound & (probability > OCCUPIED_ABOVE) & ~explained], follows=follows)
             self._lacks = not follows or (self._lacks and not is_first)
             self._parts_in, self._parts = delta.part + 1, delta.parts
             self._take(keys[sound], probability[sound], explained[sound])
@@ -259,11 +263,21 @@ class MapMirror:
             self._begin_anew(delta)
         elif is_first or not delta.whole:
             self._end_retelling()
-            if is_first and delta.parts > 1:
+            if is_first:
                 self._retold = {}
-            elif is_first:
-                self._forget()
         self.t_mono_s, self.revision = delta.t_mono_s, delta.revision
+
+    def _note_flight(self, delta: MapDelta, seen: I32, *, follows: bool) -> None:
+        """A map of a flight before in which something is seen in this one, or may be, is this one's."""
+        if self._began_mono_s != self._before_mono_s:
+            return
+        if not self._flies:
+            self._before_revision = max(self._before_revision, delta.revision)
+        elif delta.revision > self._before_revision:
+            known = _unexplained_ids(self._chunks) if delta.whole else np.zeros(0, np.int64)
+            is_more = not np.isin(_ids(seen), known).all()
+            if not follows or is_more:
+                self._before_mono_s = None
 
     def _begin_anew(self, delta: MapDelta) -> None:
         """Another map is told: the one that was here counts on where it was seen in this flight."""

@@ -228,6 +228,50 @@ def test_a_map_of_a_flight_before_that_is_told_again_stays_one(came: str) -> Non
     assert kept_in(mirror) == {(1, 1, 9)}, "what was seen since counts where its node dies"
 
 
+@pytest.mark.parametrize(
+    ("told", "is_of_this_flight"),
+    [
+        ({"keys": [(50, 50, 5)], "since": 7, "revision": 8}, True),
+        ({"keys": [CRANE], "since": 7, "revision": 8}, True),
+        ({"keys": [(50, 50, 5)], "since": 7, "revision": 8, "explained": 1}, False),
+        ({"keys": [CRANE], "since": 7, "revision": 8, "probability": 20}, False),
+        ({"keys": [], "since": 8, "revision": 9}, True),
+        ({"keys": [CRANE, GROUND], "whole": True, "revision": 9, "explained": [0, 1]}, False),
+        ({"keys": [CRANE, (50, 50, 5)], "whole": True, "revision": 9}, True),
+        ({"keys": [CRANE, (50, 50, 5)], "whole": True, "revision": 7}, False),
+        ({"keys": [CRANE], "whole": True, "revision": 9, "parts": 2}, False),
+        ({"keys": [(50, 50, 5)], "whole": True, "revision": 9, "parts": 2}, True),
+    ],
+    ids=[
+        "seen", "seen again", "known ground", "free", "something never came", "told again",
+        "told again with more", "as it was", "half told again", "half told again with more",
+    ],
+)  # fmt: skip
+def test_what_is_seen_in_a_map_that_runs_on_over_a_landing_counts_where_that_map_dies(
+    told: dict[str, Any], *, is_of_this_flight: bool
+) -> None:
+    mirror = in_flight()
+    for flies in (False, True):
+        mirror.on_flight(flies=flies)
+    mirror.fold(delta(**told, began_mono_s=1.0))
+    before = {tuple(key) for voxels in mirror.seen_so_far() for key in voxels.keys[~voxels.explained].tolist()}
+    mirror.fold(delta([], whole=True, revision=0, began_mono_s=2.0))
+    assert kept_in(mirror) == (before if is_of_this_flight else set())
+    assert mirror.has_forgotten is (told["keys"] == [])
+
+
+def test_a_map_that_never_came_whole_before_the_flight_is_of_it_once_more_is_told() -> None:
+    for revision, is_of_this_flight in ((8, False), (9, True)):
+        mirror = in_flight()
+        mirror.fold(delta([CRANE], whole=True, revision=8, parts=2, began_mono_s=1.0))
+        for flies in (False, True):
+            mirror.on_flight(flies=flies)
+        assert mirror.origin is None
+        mirror.fold(delta([CRANE], whole=True, revision=revision, began_mono_s=1.0))
+        mirror.fold(delta([], whole=True, revision=0, began_mono_s=2.0))
+        assert kept_in(mirror) == ({CRANE} if is_of_this_flight else set())
+
+
 def test_a_map_that_was_emptied_on_the_ground_is_of_the_flight_that_follows() -> None:
     mirror = in_flight()
     mirror.on_flight(flies=False)
