@@ -258,17 +258,15 @@ class Flying:
 
     async def _hear_of_nodes(self) -> None:
         """The link that flies for the operator fails, or is back: said at once, with what to do."""
-        answered = True
+        answered, restarts = True, self.nodes.link_restarts
         while True:
             await self.nodes.changed.wait()
             self.nodes.changed.clear()
-            answers = self.nodes.link_answers
-            if answers == answered:
-                continue
-            answered = answers
-            self._watch.on_link_process(answers=answers)
-            if self.live.armed:
-                self.live.on_text(VehicleText(time.time(), *(_LINK_IS_BACK if answers else _LINK_FAILS)))
+            before, answered, restarts = (answered, restarts), self.nodes.link_answers, self.nodes.link_restarts
+            if before != (answered, restarts):
+                self._watch.on_link_process(answers=answered, has_ended=restarts > before[1])
+            if before[0] != answered and self.live.armed:
+                self.live.on_text(VehicleText(time.time(), *(_LINK_IS_BACK if answered else _LINK_FAILS)))
 
     # What is heard
 

@@ -55,6 +55,11 @@ class Nodes:
         """False while it hangs or is being started again; true before it is first wanted, too."""
         return not any(n.name == LINK and n.state in ("silent", "restarting") for n in self.supervisor.states)
 
+    @property
+    def link_restarts(self) -> int:
+        """How often it has ended and was started again."""
+        return next((node.restarts for node in self.supervisor.states if node.name == LINK), 0)
+
     async def simulator_link(self) -> str | None:
         """Where the simulated vehicle sends to, if one runs."""
         facts = await asyncio.to_thread(running_node, self._runtime_dir, SIMULATOR)

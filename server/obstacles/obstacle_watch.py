@@ -150,17 +150,16 @@ class Watch:
 
     def on_avoidance(self, status: AvoidanceStatus) -> None:
         before, self._heard_avoidance = self.avoidance, status
-        self.avoidance = status
-        if status.enabled and not self._link_answers:
-            self.avoidance = replace(
-                status, state="lost", text=_NOBODY_WATCHES["lost"], largest_speed_m_s=None, sensors=(), eyes=()
-            )
+        self.avoidance = status if self._link_answers else _lost_with_link(status)
         self._tell_blindness(before)
         self.refresh()
 
-    def on_link_process(self, *, answers: bool) -> None:
-        """It avoids obstacles: what it said last holds no longer than it answers."""
+    def on_link_process(self, *, answers: bool, has_ended: bool = False) -> None:
+        """It avoids obstacles: what it said last holds no longer than it answers. ``has_ended``: another one
+        takes over, and only its own word says what avoids then."""
         self._link_answers = answers
+        if has_ended:
+            self._heard_avoidance = _lost_with_link(self._heard_avoidance)
         self.on_avoidance(self._heard_avoidance)
 
     def _tell_blindness(self, before: AvoidanceStatus) -> None:
@@ -350,6 +349,12 @@ class Watch:
     def _tell_own(self, alert: ObstacleAlert) -> None:
         now_s = self._now_mono_s()
         self.on_alert(replace(alert, t_mono_s=now_s, t_utc_s=self._now_utc_s(), done_t_mono_s=now_s))
+
+
+def _lost_with_link(heard: AvoidanceStatus) -> AvoidanceStatus:
+    if not heard.enabled:
+        return heard
+    return replace(heard, state="lost", text=_NOBODY_WATCHES["lost"], largest_speed_m_s=None, sensors=(), eyes=())
 
 
 def _filled(status: PerceptionStatus) -> list[MapName]:

@@ -14,6 +14,7 @@ from mapping.voxels.map import VoxelMap
 from server.errors import NotReadyError
 from server.obstacles.obstacle_watch import DEAD_S, LATE_S, Watch
 from server.obstacles.surroundings import are_maps_whole, seen_maps
+from server.stations import Flying
 from telemetry.perception.map_changes import ChangeTeller
 from telemetry.topics.obstacles import AvoidanceStatus, Basis, FlightMapStatus
 from telemetry.topics.vehicle import VehicleState
@@ -100,6 +101,59 @@ def test_avoidance_is_gone_with_the_link_process_and_back_with_its_word() -> Non
     watch.on_link_process(answers=False)
     watch.on_avoidance(AvoidanceStatus())
     assert watch.state.avoidance.state == "off", "what comes up without it is off, whatever was on before"
+
+
+@pytest.mark.parametrize(
+    ("says", "over"),
+    [
+        (AvoidanceStatus(enabled=True, state="watching", sensors=("radar",)), "Avoidance sees again."),
+        (AvoidanceStatus(), "Avoidance is off."),
+        (AvoidanceStatus(enabled=True, state="lost", text="not heard yet"), None),
+    ],
+)
+@pytest.mark.parametrize("is_early", [False, True], ids=["once it runs", "before it is known to run"])
+def test_the_loss_of_a_link_that_was_killed_ends_with_the_next_one_s_own_word(
+    says: AvoidanceStatus, over: str | None, *, is_early: bool
+) -> None:
+    told = Told()
+    vehicle: Any = SimpleNamespace(in_air=True)
+    watch = Watch("live", told, vehicle, now_mono_s=Clock(), now_utc_s=lambda: 5000.0)
+    watch.on_avoidance(AvoidanceStatus(enabled=True, state="watching", sensors=("radar",), largest_speed_m_s=5.8))
+    watch.on_link_process(answers=False)
+    watch.on_link_process(answers=False, has_ended=True)
+    if is_early:
+        watch.on_avoidance(says)
+    watch.on_link_process(answers=True)
+    if not is_early:
+        assert (watch.state.avoidance.state, watch.state.avoidance.largest_speed_m_s) == ("lost", None)
+        assert [doc.over for doc in watch.state.alerts] == [False]
+        watch.on_avoidance(says)
+    assert watch.state.avoidance == says
+    said = [message.alert for message in told if message.type == "alert"]
+    assert [alert.text for alert in said[1:]] == ([] if over is None else [over])
+
+
+def test_a_link_that_only_hung_goes_on_with_its_word_and_one_that_ended_does_not() -> None:
+    async def scenario() -> None:
+        heard: list[tuple[bool, bool]] = []
+        nodes = SimpleNamespace(changed=asyncio.Event(), link_answers=True, link_restarts=2)
+        watch = SimpleNamespace(on_link_process=lambda *, answers, has_ended: heard.append((answers, has_ended)))
+        station: Any = SimpleNamespace(nodes=nodes, _watch=watch, live=SimpleNamespace(armed=False))
+        hearing = asyncio.create_task(Flying._hear_of_nodes(station))
+        try:
+            for answers, restarts in ((False, 2), (True, 2), (False, 2), (False, 3), (True, 3), (True, 4), (True, 0)):
+                await asyncio.sleep(0)
+                nodes.link_answers, nodes.link_restarts = answers, restarts
+                nodes.changed.set()
+                while nodes.changed.is_set():
+                    await asyncio.sleep(0)
+        finally:
+            hearing.cancel()
+        hung_and_back, killed, at_once = [(False, False), (True, False)], [(False, False), (False, True)], (True, True)
+        stopped = True, False
+        assert heard == [*hung_and_back, *killed, (True, False), at_once, stopped]
+
+    asyncio.run(scenario())
 
 
 def test_an_alert_is_new_once() -> None:
