@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +19,7 @@ from server.obstacles.rest_of_plan import rest_of_plan
 from server.obstacles.section import map_file
 from server.obstacles.surroundings import Surroundings
 from server.plan.plan_requests import PlanRequests
+from server.scene.mirror import MapMirror
 from server.schemas import (
     MapFormat,
     ObstaclesState,
@@ -138,21 +139,27 @@ class ObstacleDesk:
         await self._link.call(await self._manoeuvres.request(operator, manoeuvre_id))
 
     async def plan_with_seen(self, body: PlanWithSeen) -> PlanState:
-        """With what was seen before a map began anew in this flight. Raises NotReadyError when nothing was seen, and
-        for a part when no mission is flown."""
+        """With what was seen before a map began anew in this flight; where something is missing, the edit's words say
+        so. Raises NotReadyError when nothing was seen, and for a part when no mission is flown."""
         if not body.seen:
             return await self._plans.plan_without_seen()
         mirrors = [self._live.mirrors[sensor] for sensor in dict.fromkeys(body.sensors)]
+        lacking = [mirror for mirror in mirrors if self._live.is_lacking(mirror.sensor)]
+        missing = f"parts of {_maps(lacking)} are missing"
         maps = [seen for mirror in mirrors for seen in await asyncio.to_thread(mirror.seen_so_far)]
         maps = [seen for seen in maps if len(seen.keys) and not seen.explained.all()]
+        if not maps and lacking:
+            what = f"Nothing else was seen that the surface model does not know, and {missing}."
+            raise NotReadyError(what, advice="They are asked for: plan again once they have come, or plan as is.")
         if not maps:
             raise NotReadyError(
                 "Nothing was seen that the surface model does not know.", advice="Fly on, or plan as is."
             )
         live = self._around.live
-        began_anew = [f"the {mirror.sensor} map" for mirror in mirrors if mirror.kept_count]
-        also = f", also before {' and '.join(began_anew)} began anew" if began_anew else ""
-        seen = maps, live.state, home_of_takeoff(live.track.states), f"Plan against what was seen{also}"
+        began_anew = [mirror for mirror in mirrors if mirror.kept_count]
+        also = f", also before {_maps(began_anew)} began anew" if began_anew else ""
+        but = f", but not all: {missing}" if lacking else ""
+        seen = maps, live.state, home_of_takeoff(live.track.states), f"Plan against what was seen{also}{but}"
         if body.part == "whole":
             return await self._plans.plan_with_seen(*seen)
         part, underway = body.part, self._around.underway
@@ -174,3 +181,7 @@ class ObstacleDesk:
     def _set(self, settings: PerceptionSettings) -> None:
         self._live.on_settings(settings)
         self._bus.publish(Topic.PERCEPTION_SETTINGS, settings)
+
+
+def _maps(mirrors: Sequence[MapMirror]) -> str:
+    return " and ".join(f"the {mirror.sensor} map" for mirror in mirrors)

@@ -222,6 +222,11 @@ class Watch:
         """Its node is not heard."""
         return self._now_mono_s() - self._heard_mono_s.get(sensor, float("-inf")) > DEAD_S
 
+    def is_lacking(self, name: MapName) -> bool:
+        """Something of that map is not here, or is lost."""
+        mirror = self.mirrors[name]
+        return sensor_of(name) in self.awaited or mirror.has_forgotten or not mirror.is_complete
+
     def fresh_cloud(self) -> CloudLook | None:
         """What the camera sees now; a camera that has stopped sees nothing."""
         look = self._cloud_look
@@ -323,7 +328,7 @@ class Watch:
                 f"forgot-{name}",
                 name,
                 f"Not all that the {name} had seen before its map began anew could be kept: no way and no return is"
-                f" certified {_UNTIL}.",
+                f" certified {_UNTIL}, and plans against what was seen are without it.",
                 over=f"What the {name} had seen before is not waited for any more.",
                 holds=mirror.has_forgotten,
             )
@@ -331,7 +336,7 @@ class Watch:
             "start",
             "radar",
             "The vehicle was in the air when this server heard it first: what sensors saw before that, and have not in"
-            f" their maps any more, does not count for ways and returns {_UNTIL}.",
+            f" their maps any more, does not count for ways, returns and plans {_UNTIL}.",
             over="Nothing counts any more that sensors saw before this server heard the vehicle.",
             holds=bool(self._begins_in_air),
         )

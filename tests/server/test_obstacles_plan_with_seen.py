@@ -15,7 +15,7 @@ from server.obstacles.obstacle_watch import Watch
 from server.scene.mirror import Voxels
 from server.schemas import PlanWithSeen
 from tests.server.fakes import Told
-from tests.server.obstacle_messages import delta
+from tests.server.obstacle_messages import delta, status
 
 CRANE, MAST, TREE = (4, 0, 20), (9, 0, 12), (2, 7, 3)
 
@@ -58,5 +58,33 @@ def test_what_was_seen_before_a_map_began_anew_is_planned_against_and_named(tmp_
         assert both == ({CRANE, MAST, TREE}, words.replace("radar map", "radar map and the vision map"))
         await watch.on_flight(flies=False)
         assert await desk.plans("radar", "vision") == ({MAST}, "Plan against what was seen")
+
+    asyncio.run(scenario())
+
+
+def test_a_plan_against_half_of_what_was_seen_says_what_it_lacks(tmp_path: Path) -> None:
+    async def scenario() -> None:
+        desk = Desk(tmp_path)
+        watch, words = desk.watch, "Plan against what was seen"
+        await watch.on_flight(flies=True)
+        watch.on_status(status(voxels_occupied=1))
+        with pytest.raises(NotReadyError, match="and parts of the radar map are missing") as refused:
+            await desk.plans("radar", "vision")
+        assert "plan again" in refused.value.advice
+        await watch.on_map(delta([TREE], whole=True, began_mono_s=1.0, sensor="vision"))
+        lacks = f"{words}, but not all: parts of the radar map are missing"
+        assert await desk.plans("radar", "vision") == ({TREE}, lacks), "nothing of it has come"
+        assert await desk.plans("vision") == ({TREE}, words)
+        await watch.on_map(delta([CRANE], whole=True, began_mono_s=12.0))
+        (lost,) = [each.alert.text for each in watch.state.alerts if each.alert.id.startswith("forgot-radar")]
+        assert "plans against what was seen are without it" in lost
+        assert await desk.plans("radar") == ({CRANE}, lacks), "it is lost"
+        await watch.dismiss(1)
+        await watch.on_map(delta([CRANE], whole=True, revision=2, parts=2, began_mono_s=12.0, clear_count=1))
+        assert await desk.plans("radar") == ({CRANE}, lacks), "half of it has come"
+        await watch.on_map(delta([MAST], whole=True, revision=2, part=1, parts=2, began_mono_s=12.0, clear_count=1))
+        assert await desk.plans("radar") == ({CRANE, MAST}, words)
+        watch.awaited.add("radar")
+        assert await desk.plans("radar") == ({CRANE, MAST}, lacks), "its node has not spoken to this server yet"
 
     asyncio.run(scenario())
