@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import time
 from collections.abc import Sequence
 from itertools import pairwise
@@ -10,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from mapping.geometry.arrays import F64, I64, Bools
-from mapping.geometry.frames import LocalFrame
+from mapping.geometry.frames import LocalFrame, apart_m
 from server.errors import NotReadyError
 from server.heard.channel import Channel
 from server.heard.onboard import Aboard
@@ -104,15 +105,28 @@ def is_more_seen_near(
             continue
         frame = LocalFrame(origin.lat_deg, origin.lon_deg, origin.alt_amsl_m)
         line_m = frame.to_enu(lat_deg, lon_deg, origin.alt_amsl_m)[:, :2]
-        is_open = ~map_.explained
-        centres = map_.centres_enu_m[is_open]
-        near = _is_near(centres[:, :2], line_m, within_m + map_.resolution_m)
         grid = map_.sensor, origin, map_.resolution_m
         known = [packed_keys(a.keys[~a.explained]) for a in before if (a.sensor, a.origin, a.resolution_m) == grid]
-        fresh = ~_are_among(packed_keys(map_.keys[is_open][near]), np.concatenate([np.zeros(0, np.int64), *known]))
-        if fresh.any() and not _are_beside(centres[near][fresh], _seen_enu_m(before, frame)):
+        numbers = packed_keys(map_.keys[~map_.explained])
+        fresh = ~_are_among(numbers, np.concatenate([np.zeros(0, np.int64), *known]))
+        # Few of many: a line with many returns from it is long.
+        centres = map_.centres_enu_m[~map_.explained][fresh]
+        near = _is_near(centres[:, :2], line_m, within_m + map_.resolution_m)
+        if near.any() and not _are_beside(centres[near], _seen_enu_m(before, frame)):
             return True
     return False
+
+
+def returns_from(
+    places_deg: Sequence[tuple[float, float]], ends_deg: Sequence[tuple[float, float]], within_m: float
+) -> list[tuple[float, float]]:
+    """A line (lat_deg, lon_deg) along places that are flown, and along straight ways from there to each of the ends: so
+    many that whatever such a way passes over lies within ``within_m`` of the line."""
+    line = list(places_deg[:1])
+    for a, b in pairwise(places_deg):
+        steps = max(1, math.ceil(apart_m(a, b) / (2.0 * max(within_m, 1.0))))
+        line += [(a[0] + (b[0] - a[0]) * k / steps, a[1] + (b[1] - a[1]) * k / steps) for k in range(1, steps + 1)]
+    return [*line, *(place for end in ends_deg for start in reversed(line) for place in (start, end))]
 
 
 def _seen_enu_m(maps: Sequence[Voxels], frame: LocalFrame) -> F64:
@@ -148,11 +162,13 @@ def _are_among(numbers: I64, known: I64) -> Bools:
 def _is_near(points_m: F64, line_m: F64, within_m: float) -> Bools:
     """(N,) of (N, 2) points and a line (K, 2)."""
     near = ((points_m >= line_m.min(axis=0) - within_m) & (points_m <= line_m.max(axis=0) + within_m)).all(axis=1)
-    among, is_near = points_m[near], np.zeros(int(near.sum()), np.bool_)
+    among = points_m[near]
+    left = np.arange(len(among))
     for a, b in pairwise(line_m if len(line_m) > 1 else np.vstack([line_m, line_m])):
-        share = np.clip((among - a) @ (b - a) / max(float((b - a) @ (b - a)), 1e-9), 0.0, 1.0)
-        is_near |= np.hypot(*(among - a - share[:, None] * (b - a)).T) <= within_m
-    near[near] = is_near
+        from_a = among[left] - a
+        share = np.clip(from_a @ (b - a) / max(float((b - a) @ (b - a)), 1e-9), 0.0, 1.0)
+        left = left[np.hypot(*(from_a - share[:, None] * (b - a)).T) > within_m]
+    near[np.flatnonzero(near)[left]] = False
     return near
 
 

@@ -10,6 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 
+from planning.fence.fence_model import RallyPoint
+from planning.formats.fence_items import rally_items
 from server.flying.checklist_desk import ChecklistDesk
 from server.flying.checklists import Checklists
 from server.flying.flight_desk import FlightDesk
@@ -23,10 +25,11 @@ from server.plan.file_tasks import make_demo_terrain
 from server.schemas import Computation, FlyState, PlanDoc, PlanState, ServerMessage
 from server.work.jobs import Lane
 from telemetry.errors import SilentError, TransferError
+from telemetry.mavlink.items import wire_items
 from telemetry.mavlink.verify import as_stored, compare, digest
 from telemetry.topics.checklist import ChecklistRecord
 from telemetry.topics.messages import Candidate, LinkStatus, PlanRecord, Topic
-from telemetry.topics.onboard_lists import OnboardMission, UploadReport
+from telemetry.topics.onboard_lists import Item, OnboardMission, UploadReport
 from telemetry.topics.requests import Download, DownloadPlaces, Operator, ReadParameters, Upload, UploadPlaces
 from telemetry.topics.vehicle import VehicleState
 from tests.server.fakes import Told
@@ -108,6 +111,13 @@ class Made:
     @property
     def home(self) -> tuple[float, float]:
         return self.document.pois[0].lat_deg, self.document.pois[0].lon_deg
+
+    def rally(self, *, east_m: float = 0.0, north_m: float = 0.0) -> tuple[Item, ...]:
+        """One rally point, so far from the plan's home, as the vehicle holds it."""
+        there = self.standing(east_m=east_m, north_m=north_m)
+        assert there.lat_deg is not None
+        assert there.lon_deg is not None
+        return wire_items(rally_items([RallyPoint(there.lat_deg, there.lon_deg, 40.0)], "ardupilot"))
 
     def standing(self, *, east_m: float = 0.0, north_m: float = 0.0) -> VehicleState:
         """Disarmed and ready, so far from the plan's home."""

@@ -36,6 +36,7 @@ from tests.server.obstacle_messages import delta
 pytestmark = pytest.mark.xdist_group("flying-desk")
 
 
+FAR = {"east_m": 0.0, "north_m": 80.0}
 LONG_S = 600.0
 """Positions are of now for so long: a busy machine judges slowly."""
 
@@ -265,6 +266,44 @@ def test_a_home_near_whose_return_more_is_seen_since_it_was_judged_is_not_set(
     runner.run(scenario())
 
 
+def test_a_home_is_not_set_where_more_is_seen_near_the_way_to_a_rally_point(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    """Autopilots return to the nearest of rally points and home."""
+
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        bench.vehicle.places["rally"] = made.rally(**FAR)
+        radar, home = bench.watch.mirrors["radar"], home_of(bench.state)
+        assert home is not None
+        told: dict[str, Any] = {"origin": MapOrigin(home.lat_deg, home.lon_deg, home.alt_amsl_m), "resolution_m": 1.0}
+        radar.fold(delta([], whole=True, revision=1, **told))
+        doc = await bench.asked(20.0)
+        assert doc.ret is not None
+        assert doc.ret.state == "certified", doc.ret.reasons
+        east, north = round(0.8 * FAR["east_m"]), round(0.8 * FAR["north_m"])
+        radar.fold(delta([(-east, -north, 1)], since=1, revision=2, **told))
+        asked = bench.desk._asked
+        assert asked is not None
+        await asked.check_seen(bench.state, bench.desk._ways)
+        radar.fold(delta([(east, north, 1)], since=2, revision=3, **told))
+        with pytest.raises(CheckNeededError, match="seen more near the return to that home"):
+            await bench.desk.set(ME, SetHomeBody(id=doc.id))
+        # A guided way in the return's place promises no way to a rally point; it leads where it leads.
+        ret = doc.ret.model_copy(update={"state": "not_certified", "instead": True})
+        along = (made.home, (doc.lat_deg, doc.lon_deg))
+        instead = replace(asked, doc=doc.model_copy(update={"ret": ret}), led=replace(asked.led, instead_deg=along))
+        await instead.check_seen(bench.state, bench.desk._ways)
+        there = made.standing(**FAR)
+        around = (made.home, (there.lat_deg or 0.0, there.lon_deg or 0.0), along[1])
+        with pytest.raises(CheckNeededError, match="seen more near the return to that home"):
+            await replace(instead, led=replace(asked.led, instead_deg=around)).check_seen(bench.state, bench.desk._ways)
+        await bench.asked(20.0)
+        assert bench.vehicle.told == []
+
+    runner.run(scenario())
+
+
 def test_a_home_whose_return_was_not_certified_anyway_is_set_whatever_is_seen(
     made: Made, lane: Lane, runner: asyncio.Runner
 ) -> None:
@@ -274,9 +313,10 @@ def test_a_home_whose_return_was_not_certified_anyway_is_set_whatever_is_seen(
         doc = await bench.asked(20.0)
         assert doc.ret is not None
         assert doc.ret.state == "not_certified"
+        asked = bench.desk._asked
+        assert asked is not None
+        assert [len(asked.led.instead_deg) > 1, asked.led.required_m > 0.0] == [doc.ret.instead, True]
         if doc.ret.instead:
-            asked = bench.desk._asked
-            assert asked is not None
             ret = doc.ret.model_copy(update={"instead": False})
             bench.desk._asked = replace(asked, doc=doc.model_copy(update={"ret": ret}))
         bench.watch.mirrors["radar"].expect(10.0)

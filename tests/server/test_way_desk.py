@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from mapping.geometry.frames import moved_deg
+from mapping.geometry.frames import moved_deg, offset_m
 from planning.errors import ParameterError
 from planning.fence.fence_model import Fence, circle
 from planning.formats.fence_items import fence_items
@@ -22,7 +24,7 @@ from server.flying.in_flight.way_desk import WayDesk, flown_places
 from server.flying.in_flight.way_task import WayJudged, wish_of
 from server.heard.channel import Channel, ShownWay
 from server.obstacles.obstacle_watch import Watch
-from server.obstacles.surroundings import is_more_seen_near
+from server.obstacles.surroundings import _is_near, is_more_seen_near, returns_from
 from server.scene.mirror import MapMirror
 from server.schemas import FenceDoc, FlyWayBody, GuidedState, PlaceDoc, WayBody, WayDoc, WaySpeedBody
 from server.schemas.flight_docs import CHECK_FRESH_S
@@ -254,6 +256,53 @@ def test_a_way_near_which_more_is_seen_since_it_was_judged_is_not_flown(
         assert isinstance(bench.vehicle.told[-1], FlyWay)
 
     runner.run(scenario())
+
+
+def test_a_way_is_not_flown_where_more_is_seen_near_a_return_to_a_rally_point_from_it(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    async def scenario() -> None:
+        bench = Bench(made, lane)
+        assert bench.live.state is not None
+        told = {"origin": MapOrigin(*made.home, bench.live.state.home_alt_amsl_m or 0.0), "resolution_m": 1.0}
+        radar = bench.watch.mirrors["radar"]
+        radar.fold(delta([], whole=True, revision=1, **told))
+        ways = [await bench.judged(action="to", place=bench.beside(30.0, 0.0), height_m=20.0)]
+        radar.fold(delta([(0, 64, 1)], since=1, revision=2, **told))
+        in_hand = bench.desk._in_hand
+        assert in_hand is not None
+        await bench.desk._check_seen(in_hand)
+        radar.fold(delta([(0, 64, 1)], 20, since=2, revision=3, **told))
+        bench.vehicle.places["rally"] = made.rally(north_m=80.0)
+        ways.append(await bench.judged(action="to", place=bench.beside(30.0, 0.0), height_m=20.0))
+        assert [way.problem for way in ways] == [None, None], ways[-1].reasons
+        radar.fold(delta([(0, 64, 1)], since=3, revision=4, **told))
+        with pytest.raises(CheckNeededError, match="seen more near the way"):
+            await bench.desk.fly(ME, FlyWayBody(id=ways[-1].id))
+        assert bench.vehicle.told == []
+
+    runner.run(scenario())
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.tuples(*[st.floats(-300.0, 300.0)] * 2), min_size=2, max_size=4),
+    st.lists(st.tuples(*[st.floats(-300.0, 300.0)] * 2), min_size=1, max_size=3),
+    st.tuples(*[st.floats(0.0, 1.0)] * 2),
+    st.integers(0, 11),
+)
+def test_whatever_a_return_from_anywhere_on_a_way_passes_over_lies_near_the_line(
+    places: list[tuple[float, float]], ends: list[tuple[float, float]], share: tuple[float, float], chosen: int
+) -> None:
+    def deg(place: tuple[float, float]) -> tuple[float, float]:
+        return moved_deg((46.0, 7.0), *place)
+
+    line_deg = returns_from([deg(place) for place in places], [deg(end) for end in ends], 10.0)
+    line = np.array([offset_m((46.0, 7.0), *place) for place in line_deg])
+    a, b = np.array(places[chosen % (len(places) - 1) :][:2])
+    start = a + share[0] * (b - a)
+    over = start + share[1] * (np.array(ends[chosen % len(ends)]) - start)
+    assert _is_near(over[None], line, 10.2).all()
 
 
 def test_what_is_seen_again_a_little_elsewhere_is_the_same_thing() -> None:

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 from mapping.geometry.frames import apart_m
 from server.errors import CheckNeededError
+from server.flying.in_flight.home_task import Led
 from server.flying.in_flight.way_desk import WayDesk
+from server.obstacles.surroundings import returns_from
 from server.scene.mirror import Voxels
 from server.schemas import HomeAskedDoc
 from server.schemas.flight_docs import CHECK_FRESH_S
@@ -29,8 +31,7 @@ class AskedHome:
     """From which it was judged."""
     maps: tuple[Voxels, ...]
     """What sensors had seen of which the return to it keeps clear."""
-    required_m: float
-    """So far."""
+    led: Led
 
     def check_still(self, now: VehicleState | None) -> None:
         """Raises CheckNeededError where that is long ago, or home, or for "here" the vehicle, is elsewhere by now."""
@@ -48,14 +49,17 @@ class AskedHome:
             raise CheckNeededError("The vehicle has moved since that was judged.", advice=AGAIN)
 
     async def check_seen(self, now: VehicleState | None, ways: WayDesk) -> None:
-        """Raises CheckNeededError where more was seen near a way home that was said to be certified, from where the
-        vehicle was or is; NotReadyError where nobody knows. Guided ways are not flown then, either."""
+        """Raises CheckNeededError where more was seen near a way to that home or to a rally point that was said to be
+        certified, from where the vehicle was or is; NotReadyError where nobody knows. Guided ways are not flown then,
+        either."""
         ret = self.doc.ret
         if now is None or ret is None or not (ret.state == "certified" or ret.instead):
             return
-        there = self.doc.lat_deg, self.doc.lon_deg
-        line_deg = [place for place in (_place(self.state), there, _place(now)) if place is not None]
-        if await ways.has_seen_more_near(self.maps, line_deg, self.required_m):
+        led, places = self.led, [place for place in (_place(self.state), _place(now)) if place is not None]
+        # A guided way promises no other return.
+        ends = () if ret.instead else ((self.doc.lat_deg, self.doc.lon_deg), *led.rally_deg)
+        line_deg = [*reversed(places), *led.instead_deg] if ret.instead else returns_from(places, ends, led.required_m)
+        if await ways.has_seen_more_near(self.maps, line_deg, led.required_m):
             what = "Sensors have seen more near the return to that home since it was judged."
             # Who flies on sees more all the while.
             raise CheckNeededError(what, advice=AGAIN if why_moves(now) is None else "Hold, then ask for home again.")

@@ -127,7 +127,7 @@ class HomeDesk:
             if vehicle != self._adopted:
                 raise ConflictError("Another vehicle was adopted meanwhile.", advice="Ask for home again.")
             doc = self._doc(judged, asked.state, is_here=place is None)
-            self._asked = AskedHome(doc, time.monotonic(), asked.state, asked.maps, judged.required_m)
+            self._asked = AskedHome(doc, time.monotonic(), asked.state, asked.maps, judged.led)
         finally:
             self._is_judging = False
             self._tell()

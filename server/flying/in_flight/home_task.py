@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mapping.errors import DescribedError
+from planning.guided.guided_model import GuidedWay
 from server.flying.in_flight.way_task import WayAsked, judge_way
 from server.library.documents import demands_from_doc
 from server.library.terrains import load_terrain
@@ -22,12 +23,23 @@ from telemetry.topics.vehicle import VehicleState
 
 
 @dataclass(frozen=True, slots=True)
+class Led:
+    """Where a return that was judged leads."""
+
+    required_m: float = 0.0
+    """That it must keep from everything."""
+    rally_deg: tuple[tuple[float, float], ...] = ()
+    """(lat_deg, lon_deg) of rally points: autopilots return to the nearest of these and home."""
+    instead_deg: tuple[tuple[float, float], ...] = ()
+    """(lat_deg, lon_deg) along the guided way that is certified in its place; none where it is certified itself."""
+
+
+@dataclass(frozen=True, slots=True)
 class HomeJudged:
     home: HomePlace
     ret: ReturnDoc | None
     """Of the vehicle's own return to it; None: the vehicle stands on the ground."""
-    required_m: float = 0.0
-    """That the return must keep from everything."""
+    led: Led = Led()
 
 
 def judge_home(asked: WayAsked, place: tuple[float, float] | None, *, report: Progress) -> HomeJudged:
@@ -47,32 +59,37 @@ def judge_return(asked: WayAsked, *, report: Progress) -> ReturnDoc:
     return _judged_return(asked, report)[0]
 
 
-def _judged_return(asked: WayAsked, report: Progress) -> tuple[ReturnDoc, float]:
-    """With the clearance that it must keep."""
+def _judged_return(asked: WayAsked, report: Progress) -> tuple[ReturnDoc, Led]:
     now_s = time.monotonic()
     try:
         lat_deg, lon_deg = _at(asked.state)
         here = WayBody(action="look", place=PlaceDoc(lat_deg=lat_deg, lon_deg=lon_deg))
-        way = judge_way(replace(asked, body=here), report=report).way
+        judged = judge_way(replace(asked, body=here), report=report)
     except DescribedError as error:
         reason = ReasonDoc(code="home", text=error.what, mend=error.advice)
-        return ReturnDoc(state="unknown", reasons=[reason], judged_mono_s=now_s), 0.0
+        return ReturnDoc(state="unknown", reasons=[reason], judged_mono_s=now_s), Led()
+    way = judged.way
+    instead = None if way.problem is None else _certified_way_home(asked, report)
     reasons = [ReasonDoc(code=each.code, text=each.text, mend=each.mend) for each in way.certificate.reasons]
     doc = ReturnDoc(
         state="certified" if way.problem is None else "not_certified",
         reasons=reasons,
         clearance_m=way.clearance_m if math.isfinite(way.clearance_m) else None,
-        instead=way.problem is not None and _is_way_home_certified(asked, report),
+        instead=instead is not None,
         judged_mono_s=now_s,
     )
-    return doc, way.certificate.required_clearance_m
+    if instead is None:
+        return doc, Led(way.certificate.required_clearance_m, judged.rally_deg)
+    along_deg = tuple(place[:2] for place in instead.places)
+    return doc, Led(instead.certificate.required_clearance_m, judged.rally_deg, along_deg)
 
 
-def _is_way_home_certified(asked: WayAsked, report: Progress) -> bool:
+def _certified_way_home(asked: WayAsked, report: Progress) -> GuidedWay | None:
     try:
-        return judge_way(replace(asked, body=WayBody(action="home")), report=report).way.problem is None
+        way = judge_way(replace(asked, body=WayBody(action="home")), report=report).way
     except DescribedError:
-        return False
+        return None
+    return way if way.problem is None else None
 
 
 def _home_at(asked: WayAsked, place: tuple[float, float] | None) -> HomePlace:

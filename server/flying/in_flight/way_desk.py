@@ -16,7 +16,14 @@ from server.heard.channel import Channel, ShownWay
 from server.library import Library
 from server.obstacles.coming_down_task import SHADOW_M
 from server.obstacles.obstacle_watch import Watch
-from server.obstacles.surroundings import are_maps_whole, is_more_seen_near, is_same_seen, maps_revision, seen_maps
+from server.obstacles.surroundings import (
+    are_maps_whole,
+    is_more_seen_near,
+    is_same_seen,
+    maps_revision,
+    returns_from,
+    seen_maps,
+)
 from server.scene.mirror import Voxels
 from server.schemas import (
     FlyWayBody,
@@ -239,11 +246,15 @@ class WayDesk:
     # How
 
     async def _check_seen(self, in_hand: _InHand) -> None:
-        """Raises CheckNeededError where sensors have seen more near the way, or near the return from it, since it was
-        judged; NotReadyError where nobody knows."""
-        way, home = in_hand.judged.way, in_hand.home
-        line_deg = [place[:2] for place in way.places] + ([] if home is None else [(home.lat_deg, home.lon_deg)])
-        sees_more = await self.has_seen_more_near(in_hand.maps, line_deg, way.certificate.required_clearance_m)
+        """Raises CheckNeededError where sensors have seen more near the way, or near a return from anywhere on it that
+        is certified with it, since it was judged; NotReadyError where nobody knows."""
+        way, home, required_m = in_hand.judged.way, in_hand.home, in_hand.judged.way.certificate.required_clearance_m
+        places = [place[:2] for place in way.places]
+        ends = [] if home is None else [(home.lat_deg, home.lon_deg)]
+        line_deg = [*places, *ends]
+        if way.problem is None and not isinstance(in_hand.judged.wish, RETURNS):
+            line_deg = returns_from(places, [*ends, *in_hand.judged.rally_deg], required_m)
+        sees_more = await self.has_seen_more_near(in_hand.maps, line_deg, required_m)
         if self._in_hand is not in_hand:
             raise NotFoundError(NOWHERE, advice="Ask for the way again.")
         if sees_more:

@@ -51,6 +51,8 @@ class WayJudged:
     speed_m_s: float
     most_m_s: float
     has_seen: bool
+    rally_deg: tuple[tuple[float, float], ...]
+    """(lat_deg, lon_deg) of the rally points on board: ways to them are certified with it."""
 
 
 def judge_way(asked: WayAsked, *, report: Progress) -> WayJudged:
@@ -95,7 +97,8 @@ def judge_way(asked: WayAsked, *, report: Progress) -> WayJudged:
         speed_m_s=speed_m_s,
         now_s=asked.now_mono_s,
     )
-    return WayJudged(way, wish, speed_m_s, demands.profile.max_speed_m_s, seen is not None)
+    rally_deg = tuple((point.lat_deg, point.lon_deg) for point in rally)
+    return WayJudged(way, wish, speed_m_s, demands.profile.max_speed_m_s, seen is not None, rally_deg)
 
 
 def with_seen(
