@@ -185,6 +185,8 @@ STATUS: dict[type[Exception], int] = {
     BusyError: 503,
     WorkerDiedError: 500,
     ClusterError: 503,
+    TargetError: 502,
+    DamagedError: 422,
     CertificateError: 500,
     StartError: 503,
     TelemetryError: 502,

@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from server.schemas import FlyState, ObstaclesState
+from server.work import supervisor
 from telemetry.bus.node_lock import running_node, running_nodes
 from tests.server.running import PASSWORD
 from tests.server.station import PATIENCE_S, Station, ok, station
@@ -28,8 +29,11 @@ LONG_S = 4 * PATIENCE_S
 def demo(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Station]:
     folder = tmp_path_factory.mktemp("data")
     try:
-        with station(folder, demo=True, flies=True, demo_world=True, password=PASSWORD) as made:
-            yield made
+        with pytest.MonkeyPatch.context() as patched:
+            # So long a link that hangs is asked what it answers.
+            patched.setattr(supervisor, "LINK_HUNG_S", 6.0)
+            with station(folder, demo=True, flies=True, demo_world=True, password=PASSWORD) as made:
+                yield made
     finally:
         # With an armed vehicle they outlive their server on purpose.
         for facts in running_nodes(folder / "run"):

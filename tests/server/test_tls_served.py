@@ -34,6 +34,10 @@ from server.errors import CertificateError
 from server.scene.host import SUBPROTOCOL
 from server.schemas import AlarmsMessage, ServerMessage
 from tests.free_ports import free_port
+from tests.server import test_tls
+
+files = test_tls.files
+"""Certificates of a test's own, beside the station's."""
 
 
 @dataclass(slots=True)
