@@ -190,9 +190,9 @@ def _local_places(ulog: ULog) -> tuple[F64, F64, F64, F64]:
     ref_lat, ref_lon = np.radians(rows.column("ref_lat")), np.radians(rows.column("ref_lon"))
     c = np.hypot(north, east)
     share = np.sinc(c / np.pi)  # sin(c) / c
-    sin_lat = np.cos(c) * np.sin(ref_lat) + north * share * np.cos(ref_lat)  # eq. 20-14
+    sin_lat = np.cos(c) * np.sin(ref_lat) + north * share * np.cos(ref_lat)  # Snyder 1987, 20-14
     across = np.cos(ref_lat) * np.cos(c) - north * share * np.sin(ref_lat)
-    lon = ref_lon + np.arctan2(east * share, across)  # eq. 20-15
+    lon = ref_lon + np.arctan2(east * share, across)  # Snyder 1987, 20-15
     lat_deg = np.degrees(np.arcsin(np.clip(sin_lat, -1.0, 1.0)))
     return t_s[known], lat_deg, np.degrees(lon), rows.column("ref_alt") - rows.column("z")
 
