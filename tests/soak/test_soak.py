@@ -34,7 +34,7 @@ def flown(*said: Told, faults: tuple[str, ...] = (), text: str = "", back_s: flo
     return Flown(cast(Any, page), (done,), 90.0, 200.0, "d", cast(Any, (log,)))
 
 
-NODES = told(101.2, "nodes", nodes=[{"name": "link", "state": "silent"}])
+NODES = told(101.2, "nodes", nodes=[{"name": "link", "state": "silent", "restarts": 0}])
 LOST = avoidance(102.0, "lost")
 
 
@@ -43,9 +43,17 @@ def test_a_fault_that_is_told_and_mended_breaks_nothing() -> None:
 
 
 def test_what_the_next_link_says_before_it_is_seen_to_run_is_no_wrong_word() -> None:
-    back = told(108.0, "nodes", nodes=[{"name": "link", "state": "running"}])
+    back = told(108.0, "nodes", nodes=[{"name": "link", "state": "running", "restarts": 1}])
     assert broken(flown(NODES, LOST, avoidance(107.9, "watching"), back)) == []
     assert broken(flown(NODES, LOST, avoidance(106.0, "watching"), back)) != []
+
+
+def test_a_node_that_a_spare_one_replaced_at_once_was_told_of_by_its_restart() -> None:
+    running = {"name": "link", "state": "running"}
+    before, after = (told(t_s, "nodes", nodes=[{**running, "restarts": n}]) for t_s, n in ((99.0, 1), (100.2, 2)))
+    assert broken(flown(before, LOST, after)) == []
+    again = told(100.2, "nodes", nodes=[{**running, "restarts": 1}])
+    assert any("does not work" in sentence for sentence in broken(flown(before, LOST, again)))
 
 
 @pytest.mark.parametrize(("flight", "words"), [

@@ -49,8 +49,10 @@ def _untold(flown: Flown, done: Done) -> Iterator[str]:
         if "server_restarted" not in codes:
             yield f"{fault}: no page was told of the server's restart within {BACK_S:.0f} s."
         return
+    # A spare one may run again before a page is told of anything between.
+    before = max(_restarts(flown, done), default=0)
     states = [
-        node["state"]
+        "restarting" if node["restarts"] > before else node["state"]
         for told in page.since(done.at_s, "nodes", until_s)
         for node in told.message["nodes"]
         if node["name"] == fault.who
@@ -61,6 +63,12 @@ def _untold(flown: Flown, done: Done) -> Iterator[str]:
         yield f"{fault}: the {fault.who} node did not work again within {BACK_S:.0f} s."
     if fault.who == "link" and fault.how == "stop" and not _lost_was_told(flown, done):
         yield f"{fault}: no page was told that avoidance is lost."
+
+
+def _restarts(flown: Flown, done: Done) -> Iterator[int]:
+    """Of the node, as pages were told before the fault."""
+    for told in flown.page.since(0.0, "nodes", done.at_s):
+        yield from (node["restarts"] for node in told.message["nodes"] if node["name"] == done.fault.who)
 
 
 def _lost_was_told(flown: Flown, done: Done) -> bool:
