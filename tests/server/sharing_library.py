@@ -6,6 +6,7 @@ import threading
 from pathlib import Path
 
 import numpy as np
+import pytest
 from affine import Affine
 from pyproj import CRS
 
@@ -25,6 +26,12 @@ from server.schemas import PlanDoc
 from telemetry.recording.file_types import MCAP_MAGIC
 
 PLAN_ID = "feedc0de00000001"
+
+
+@pytest.fixture
+def stick(tmp_path: Path) -> FolderTarget:
+    (tmp_path / "stick").mkdir()
+    return FolderTarget(tmp_path / "stick")
 
 
 def closed_mcap(content: bytes) -> bytes:

@@ -28,14 +28,11 @@ from tests.server.sharing_library import (
     full_library,
     send,
     shared_files,
+    stick,
     write_plan,
 )
 
-
-@pytest.fixture
-def stick(tmp_path: Path) -> FolderTarget:
-    (tmp_path / "stick").mkdir()
-    return FolderTarget(tmp_path / "stick")
+__all__ = ["stick"]
 
 
 @pytest.fixture(params=["folder", "memory"])

@@ -27,14 +27,11 @@ from tests.server.sharing_library import (
     bring,
     send,
     shared_files,
+    stick,
     write_plan,
 )
 
-
-@pytest.fixture
-def stick(tmp_path: Path) -> FolderTarget:
-    (tmp_path / "stick").mkdir()
-    return FolderTarget(tmp_path / "stick")
+__all__ = ["stick"]
 
 
 def header(text: str) -> bytes:

@@ -9,13 +9,9 @@ import pytest
 from server.library.library import Library
 from server.library.sharing import shared_items
 from server.library.sharing.sharing_targets import BLOBS, FOLDER, FolderTarget
-from tests.server.sharing_library import add_terrain, bring, send, write_plan
+from tests.server.sharing_library import add_terrain, bring, send, stick, write_plan
 
-
-@pytest.fixture
-def stick(tmp_path: Path) -> FolderTarget:
-    (tmp_path / "stick").mkdir()
-    return FolderTarget(tmp_path / "stick")
+__all__ = ["stick"]
 
 
 @pytest.mark.parametrize("has_model", [True, False])
