@@ -45,6 +45,12 @@ async def first(values: AsyncIterator[Any], fits: Callable[[Any], bool]) -> Any:
     raise AssertionError("the stream ended")
 
 
+async def heights(telemetry: TelemetryAsync, into_m: list[float]) -> None:
+    """Each height above home (metres) that the vehicle tells, until cancelled."""
+    async for position in telemetry.subscribe_position():
+        into_m.append(position.relative_altitude_m)
+
+
 async def fly(url: str, lat_e7: int, lon_e7: int, log: str) -> dict[str, Any]:
     async with Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION)) as sdk:
         await sdk.add_any_connection(url)
@@ -59,11 +65,14 @@ async def fly(url: str, lat_e7: int, lon_e7: int, log: str) -> dict[str, Any]:
         items = mission(lat_e7, lon_e7)
         await raw.upload_mission(items)
         kept = await raw.download_mission()
+        heights_m: list[float] = []
+        # From before the flight to its end: at this speed the highest place passes while anything else is awaited.
+        watch = asyncio.create_task(heights(telemetry, heights_m))
         await action.arm()
         await raw.start_mission()
         progress = await first(raw.subscribe_mission_progress(), lambda now: now.current >= 3)
-        highest = await first(telemetry.subscribe_position(), lambda position: position.relative_altitude_m > 14)
         await first(telemetry.subscribe_armed(), lambda armed: not armed)
+        watch.cancel()
         end = await first(telemetry.subscribe_position(), lambda position: True)
         logs = LogFilesAsync(system)
         entries = await logs.get_entries()
@@ -75,7 +84,7 @@ async def fly(url: str, lat_e7: int, lon_e7: int, log: str) -> dict[str, Any]:
             "sent": len(items),
             "kept": [(item.frame, item.command, item.x, item.y, item.z) for item in kept],
             "total": progress.total,
-            "high_m": highest.relative_altitude_m,
+            "high_m": max(heights_m),
             "end_m": end.relative_altitude_m,
         }
 
