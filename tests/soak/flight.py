@@ -83,6 +83,8 @@ def fly(faults: tuple[Fault, ...], seconds: float) -> Flown:
                         done.append(_whole_again(page, do(fault, pid), data_dir))
                 time.sleep(max(0.0, begun_s + seconds - time.monotonic()))
                 ended_s = time.monotonic()
+                if page.failed:
+                    raise SoakError(f"The page itself failed: {page.failed}")
                 logs = tuple(map(read_flight_log, sorted((data_dir / "recordings").glob("*.mcap"))))
                 return Flown(page, tuple(done), begun_s, ended_s, digest, logs)
             finally:

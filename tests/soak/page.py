@@ -33,7 +33,9 @@ class Told:
 
 
 class Page:
-    """``told``: everything of the kinds that verdicts need, in order. ``connected``: there is a stream now."""
+    """``told``: everything of the kinds that verdicts need, in order. ``connected``: there is a stream now.
+    ``failed``: why it reads no more, which is no fault of the station's.
+    """
 
     def __init__(self, port: int, sign_in: str) -> None:
         self.origin = f"http://127.0.0.1:{port}"
@@ -41,7 +43,7 @@ class Page:
         self.http = client(self.origin, timeout=60.0)
         self.http.get(sign_in)
         self.told: list[Told] = []
-        self.connected = False
+        self.connected, self.failed = False, ""
         self._reader = threading.Thread(target=self._read, name="page", daemon=True)
         self._reader.start()
 
@@ -71,6 +73,12 @@ class Page:
         self.http.close()
 
     def _read(self) -> None:
+        try:
+            self._read_on()
+        except Exception as error:
+            self.failed = repr(error)
+
+    def _read_on(self) -> None:
         while not self._ends.is_set():
             try:
                 with self._open() as socket:
