@@ -13,7 +13,7 @@ from mapping.geometry.arrays import F64, I64
 from mapping.voxels.checks import checked_points
 from mapping.voxels.map import VoxelMap
 from mapping.voxels.marks import LARGEST_KEY
-from mapping.voxels.store import EXPLAINED, IN_BLOCK, OCCUPIED, SIDE_BITS, find
+from mapping.voxels.store import EXPLAINED, IN_BLOCK, OCCUPIED, SIDE_BITS, find, state_of
 
 MOST_POINTS = 5_000_000
 
@@ -130,7 +130,7 @@ def _search(store, points, x0, y0, z0, cos, sin, resolution, mask):
             last_x, last_y, last_z = bx, by, bz
         if block >= 0:
             voxel = (z & IN_BLOCK) << 6 | (y & IN_BLOCK) << 3 | (x & IN_BLOCK)
-            if store.flags[block, voxel] & mask == OCCUPIED:
+            if state_of(store, block, voxel) & mask == OCCUPIED:
                 found[n] = i
                 n += 1
     return found[:n].copy()

@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike
 from mapping.errors import CapacityError, ParameterError
 from mapping.geometry.arrays import F64, Bools
 from mapping.voxels.marks import LARGEST_KEY, MAX_RANGE_VOXELS
-from mapping.voxels.store import BLOCK_BYTES, MIN_LOG, VOXELS, blocks_that_fit
+from mapping.voxels.store import MIN_LOG, MOST_BLOCK_BYTES, VOXELS, blocks_that_fit
 from mapping.voxels.update import Model
 
 LEAST_BLOCKS = 16
 LEAST_EXTENT_M = 1_000.0
 """Keys must reach at least so far from the origin."""
-BYTES_PER_VOXEL = BLOCK_BYTES / VOXELS
+BYTES_PER_VOXEL = MOST_BLOCK_BYTES / VOXELS
 SEEN_SHARE = 0.25
 """Of the ball around the sensor, at once."""
 

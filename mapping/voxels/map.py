@@ -20,7 +20,7 @@ from mapping.voxels.checks import (
 )
 from mapping.voxels.marks import NO_GRID, Grid, mark_points
 from mapping.voxels.rays import mark_rays
-from mapping.voxels.update import apply_blocks, apply_grid, assign, mark_explained
+from mapping.voxels.update import apply_blocks, apply_grid, assign, begin_values, mark_explained
 
 LARGEST_GRID = 512
 """Voxels a side: 134 MB are set aside, of which a scan fills what its rays cross."""
@@ -70,6 +70,7 @@ class VoxelMap:
         checked_size(resolution_m, reach_m, memory_limit_bytes)
         self._model = checked_model(prob_hit, prob_miss, clamp, occupied)
         self._store = store.make_store(memory_limit_bytes)
+        begin_values(self._store, self._model)
         self._resolution_m = float(resolution_m)
         self._marks = np.zeros(0, np.uint8)
         self._emptied_at = 0
@@ -123,7 +124,7 @@ class VoxelMap:
         """Known voxels (N, 3) become explained or not, ``explained`` (N,) or one truth; others are passed over."""
         numbers = query.voxels_of(self._store, self.centres(keys), self._resolution_m)
         truths = np.broadcast_to(np.asarray(explained, dtype=np.bool_), numbers.shape)
-        mark_explained(self._store, self._model, numbers, np.ascontiguousarray(truths))
+        mark_explained(self._store, numbers, np.ascontiguousarray(truths))
 
     def probability(self, points_enu: ArrayLike) -> F64:
         """(N,) occupancy of the voxels that points (N, 3) lie in; NaN where never seen."""
@@ -160,7 +161,7 @@ class VoxelMap:
         changes, and nothing that anybody draws.
         """
         now = self.revision
-        whole = revision < max(self._emptied_at, now - len(self._store.log)) or revision > now
+        whole = revision < max(self._emptied_at, store.logged_from(self._store)) or revision > now
         if whole:
             wanted = store.KNOWN | (store.EVER_HIT if ever_hit_only else 0)
             numbers = query.list_voxels(self._store, wanted, wanted)

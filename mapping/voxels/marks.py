@@ -27,7 +27,7 @@ MAX_RANGE_VOXELS = 1 << 15
 class Grid(NamedTuple):
     """A byte for every voxel around the sensor: where the rays of an ordinary scan cross, so that nothing is looked up.
 
-    A scan that is too wide for it (length 0) leaves its marks in the map's own blocks: slower, the same outcome.
+    A scan that is too wide for it (length 0) leaves its marks in pages, one per block: slower, the same outcome.
     """
 
     marks: U8
@@ -75,11 +75,11 @@ def mark_points(store, grid, points, unexplained, resolution, origin, max_range,
                 fresh = grid.marks[place] & HIT == 0
                 grid.marks[place] |= np.uint8(hit)
             else:
-                block = touch(store, x >> SIDE_BITS, y >> SIDE_BITS, z >> SIDE_BITS)
-                if block >= 0:
+                page = touch(store, x >> SIDE_BITS, y >> SIDE_BITS, z >> SIDE_BITS)
+                if page >= 0:
                     voxel = (z & IN_BLOCK) << 6 | (y & IN_BLOCK) << 3 | (x & IN_BLOCK)
-                    fresh = store.flags[block, voxel] & HIT == 0
-                    store.flags[block, voxel] |= np.uint8(hit)
+                    fresh = store.marks[page, voxel] & HIT == 0
+                    store.marks[page, voxel] |= np.uint8(hit)
                 else:
                     store.counts[N_REFUSED] += 1
                     seen = False

@@ -9,17 +9,19 @@ from numba import njit
 
 from mapping.voxels.marks import LARGEST_KEY
 from mapping.voxels.store import (
-    EVER_HIT,
-    EXPLAINED,
+    CELL_EVER_HIT,
+    CELL_EXPLAINED,
+    CELL_LISTED,
     IN_BLOCK,
-    KNOWN,
-    LISTED,
+    LOG_MASK,
     N_BLOCKS,
     OCCUPIED,
     REVISION,
     SIDE_BITS,
+    VALUE,
     VOXELS,
     find,
+    state_of,
 )
 
 
@@ -40,14 +42,14 @@ def voxels_of(store, points, resolution):
             last_x, last_y, last_z = bx, by, bz
         if block >= 0:
             voxel = (z & IN_BLOCK) << 6 | (y & IN_BLOCK) << 3 | (x & IN_BLOCK)
-            if store.flags[block, voxel] & KNOWN:
+            if store.cells[block, voxel] & VALUE:
                 found[i] = block * VOXELS + voxel
     return found
 
 
 @njit(cache=True, nogil=True)
 def list_voxels(store, mask, value):
-    """(N,) numbers of all voxels whose flags under ``mask`` are ``value``."""
+    """(N,) numbers of all voxels whose state under ``mask`` is ``value``."""
     count = 0
     blocks = store.counts[N_BLOCKS]
     only_occupied = value & OCCUPIED != 0
@@ -55,14 +57,14 @@ def list_voxels(store, mask, value):
         if only_occupied and store.occupied[block] == 0:
             continue
         for voxel in range(VOXELS):
-            count += store.flags[block, voxel] & mask == value
+            count += state_of(store, block, voxel) & mask == value
     found = np.empty(count, np.int64)
     n = 0
     for block in range(blocks):
         if only_occupied and store.occupied[block] == 0:
             continue
         for voxel in range(VOXELS):
-            if n < count and store.flags[block, voxel] & mask == value:
+            if n < count and state_of(store, block, voxel) & mask == value:
                 found[n] = block * VOXELS + voxel
                 n += 1
     return found[:n]
@@ -72,20 +74,20 @@ def list_voxels(store, mask, value):
 def list_changes(store, revision, ever_hit_only):
     """(N,) numbers of the voxels that the log holds since ``revision``, each once, the newest change first."""
     now = store.counts[REVISION]
-    ring = store.log.size - 1
+    ring = store.counts[LOG_MASK]
     found = np.empty(now - revision, np.int64)
     n = 0
     for r in range(now - 1, revision - 1, -1):
         number = np.int64(store.log[r & ring])
         block, voxel = number // VOXELS, number % VOXELS
-        flags = store.flags[block, voxel]
-        if flags & LISTED or (ever_hit_only and not flags & EVER_HIT):
+        cell = store.cells[block, voxel]
+        if cell & CELL_LISTED or (ever_hit_only and not cell & CELL_EVER_HIT):
             continue
-        store.flags[block, voxel] = flags | LISTED
+        store.cells[block, voxel] = cell | CELL_LISTED
         found[n] = number
         n += 1
     for i in range(n):
-        store.flags[found[i] // VOXELS, found[i] % VOXELS] &= ~LISTED
+        store.cells[found[i] // VOXELS, found[i] % VOXELS] &= np.uint16(0xFFFF ^ CELL_LISTED)
     return found[:n]
 
 
@@ -100,6 +102,7 @@ def describe(store, numbers):
         keys[i, 0] = store.keys[block, 0] * 8 + (voxel & IN_BLOCK)
         keys[i, 1] = store.keys[block, 1] * 8 + (voxel >> 3 & IN_BLOCK)
         keys[i, 2] = store.keys[block, 2] * 8 + (voxel >> 6)
-        log_odds[i] = store.log_odds[block, voxel]
-        explained[i] = store.flags[block, voxel] & EXPLAINED != 0
+        cell = store.cells[block, voxel]
+        log_odds[i] = store.values[cell & VALUE]
+        explained[i] = cell & CELL_EXPLAINED != 0
     return keys, log_odds, explained

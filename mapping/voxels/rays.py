@@ -93,14 +93,14 @@ def _walk_grid(grid, x, y, z, sx, sy, sz, tx, ty, tz, gx, gy, gz, steps, length)
 
 @njit(cache=True, nogil=True)
 def _walk_blocks(store, x, y, z, sx, sy, sz, tx, ty, tz, gx, gy, gz, steps, length):
-    """One ray through the map's blocks: for scans that are too wide for a grid."""
-    bx, by, bz, block = (x >> SIDE_BITS) + 1, 0, 0, -1
+    """One ray through pages of marks: for scans that are too wide for a grid."""
+    bx, by, bz, page = (x >> SIDE_BITS) + 1, 0, 0, -1
     for _ in range(steps):
         if x >> SIDE_BITS != bx or y >> SIDE_BITS != by or z >> SIDE_BITS != bz:
             bx, by, bz = x >> SIDE_BITS, y >> SIDE_BITS, z >> SIDE_BITS
-            block = touch(store, bx, by, bz)
-        if block >= 0:
-            store.flags[block, (z & IN_BLOCK) << 6 | (y & IN_BLOCK) << 3 | (x & IN_BLOCK)] |= np.uint8(MISS)
+            page = touch(store, bx, by, bz)
+        if page >= 0:
+            store.marks[page, (z & IN_BLOCK) << 6 | (y & IN_BLOCK) << 3 | (x & IN_BLOCK)] |= np.uint8(MISS)
         else:
             store.counts[N_REFUSED] += 1
         if min(tx, ty, tz) > length:

@@ -9,29 +9,28 @@ import numpy as np
 from numba import njit
 
 from mapping.voxels.store import (
-    ANY_MARK,
-    EVER_HIT,
-    EXPLAINED,
+    CELL_EVER_HIT,
+    CELL_EXPLAINED,
+    CELL_TRUTHS,
     HIT,
     IN_BLOCK,
     KNOWN,
-    LISTED,
-    MISS,
+    LOG_MASK,
     N_EXPLAINED,
     N_KNOWN,
     N_OCCUPIED,
     N_REFUSED,
     N_TOUCHED,
+    N_VALUES,
     OCCUPIED,
     REVISION,
     SIDE,
     SIDE_BITS,
     UNEXPLAINED_HIT,
+    VALUE,
     VOXELS,
     find_or_make,
 )
-
-MARKS = MISS | HIT | UNEXPLAINED_HIT | LISTED
 
 
 class Model(NamedTuple):
@@ -46,25 +45,49 @@ class Model(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def put(store, block, voxel, log_odds, flags, occupied_above):
-    """Gives one voxel its new state; counts, and logs it when that changes anything."""
-    old = store.flags[block, voxel] & ~MARKS
-    flags = (flags & ~(MARKS | OCCUPIED)) | KNOWN
-    if log_odds > occupied_above:
-        flags |= OCCUPIED
-    same = flags == old and store.log_odds[block, voxel] == log_odds
-    store.flags[block, voxel] = flags
-    if same:
-        return
-    store.log_odds[block, voxel] = log_odds
+def number_of(store, model, log_odds):
+    """Of these log-odds among the map's values. A map that has all it can tell apart takes the next higher ones."""
     counts = store.counts
-    counts[N_KNOWN] += (flags & KNOWN) - (old & KNOWN)
-    more = ((flags & OCCUPIED) - (old & OCCUPIED)) // OCCUPIED
+    higher = 0
+    for n in range(1, counts[N_VALUES]):
+        value = store.values[n]
+        if value == log_odds:
+            return n
+        if value > log_odds and (higher == 0 or value < store.values[higher]):
+            higher = n
+    n = counts[N_VALUES]
+    if n > VALUE:
+        return higher
+    store.values[n] = log_odds
+    store.kinds[n] = KNOWN | OCCUPIED if log_odds > model.occupied else KNOWN
+    counts[N_VALUES] = n + 1
+    return n
+
+
+@njit(cache=True, nogil=True)
+def begin_values(store, model):
+    """The clamps come first: between them a next higher value is always there."""
+    number_of(store, model, model.highest)
+    number_of(store, model, model.lowest)
+
+
+@njit(cache=True, nogil=True)
+def put(store, block, voxel, cell):
+    """Gives one voxel its new cell; counts, and logs it when that changes anything."""
+    old = np.int64(store.cells[block, voxel])
+    if cell == old:
+        return
+    store.cells[block, voxel] = cell
+    counts = store.counts
+    was, now = np.int64(store.kinds[old & VALUE]), np.int64(store.kinds[cell & VALUE])
+    counts[N_KNOWN] += (now & KNOWN) - (was & KNOWN)
+    more = ((now & OCCUPIED) - (was & OCCUPIED)) // OCCUPIED
     counts[N_OCCUPIED] += more
     store.occupied[block] += more
-    both = OCCUPIED | EXPLAINED
-    counts[N_EXPLAINED] += int(flags & both == both) - int(old & both == both)
-    store.log[counts[REVISION] & (store.log.size - 1)] = block * VOXELS + voxel
+    both_now = now & OCCUPIED != 0 and cell & CELL_EXPLAINED != 0
+    both_before = was & OCCUPIED != 0 and old & CELL_EXPLAINED != 0
+    counts[N_EXPLAINED] += int(both_now) - int(both_before)
+    store.log[counts[REVISION] & counts[LOG_MASK]] = block * VOXELS + voxel
     counts[REVISION] += 1
 
 
@@ -75,32 +98,40 @@ def apply_mark(store, model, block, voxel, mark):
     A voxel counts as explained when the scan that hit it first had nothing but explained points in it, until an
     unexplained point hits it.
     """
-    flags = store.flags[block, voxel]
+    cell = np.int64(store.cells[block, voxel])
+    number, truths = cell & VALUE, cell & CELL_TRUTHS
     if mark & HIT:
-        log_odds = min(store.log_odds[block, voxel] + model.hit, model.highest)
+        after = np.int64(store.after_hit[number])
+        if after == 0:
+            after = number_of(store, model, min(store.values[number] + model.hit, model.highest))
+            store.after_hit[number] = after
         if mark & UNEXPLAINED_HIT:
-            flags &= ~EXPLAINED
-        elif not flags & EVER_HIT:
-            flags |= EXPLAINED
-        put(store, block, voxel, log_odds, flags | EVER_HIT, model.occupied)
+            truths &= ~CELL_EXPLAINED
+        elif not truths & CELL_EVER_HIT:
+            truths |= CELL_EXPLAINED
+        put(store, block, voxel, after | truths | CELL_EVER_HIT)
     else:
-        log_odds = max(store.log_odds[block, voxel] + model.miss, model.lowest)
-        put(store, block, voxel, log_odds, flags, model.occupied)
+        after = np.int64(store.after_miss[number])
+        if after == 0:
+            after = number_of(store, model, max(store.values[number] + model.miss, model.lowest))
+            store.after_miss[number] = after
+        put(store, block, voxel, after | truths)
 
 
 @njit(cache=True, nogil=True)
 def apply_blocks(store, model):
-    """Third step of a scan without a grid: the marks in the map's blocks, which are gone then."""
-    words = store.flags.view(np.uint64)
-    for n in range(store.counts[N_TOUCHED]):
-        block = store.touched[n]
+    """Third step of a scan without a grid: the marks in the blocks' pages, which are zeros then."""
+    words = store.marks.view(np.uint64)
+    for page in range(store.counts[N_TOUCHED]):
+        block = store.touched[page]
         for w in range(VOXELS // 8):
-            if words[block, w] & np.uint64(ANY_MARK) == 0:
+            if words[page, w] == 0:
                 continue
             for voxel in range(8 * w, 8 * w + 8):
-                mark = store.flags[block, voxel] & MARKS
+                mark = store.marks[page, voxel]
                 if mark:
                     apply_mark(store, model, block, voxel, mark)
+            words[page, w] = 0
 
 
 @njit(cache=True, nogil=True)
@@ -138,6 +169,7 @@ def apply_grid(store, model, grid, reached):
 def assign(store, model, points, occupied, resolution):
     """Sets the voxels of ``points`` to the highest or the lowest log-odds; those without room are counted."""
     scale = 1.0 / resolution
+    highest, lowest = number_of(store, model, model.highest), number_of(store, model, model.lowest)
     for i in range(points.shape[0]):
         x, y, z = math.floor(points[i, 0] * scale), math.floor(points[i, 1] * scale), math.floor(points[i, 2] * scale)
         block = find_or_make(store, x >> SIDE_BITS, y >> SIDE_BITS, z >> SIDE_BITS)
@@ -145,21 +177,19 @@ def assign(store, model, points, occupied, resolution):
             store.counts[N_REFUSED] += 1
             continue
         voxel = (z & IN_BLOCK) << 6 | (y & IN_BLOCK) << 3 | (x & IN_BLOCK)
-        flags = store.flags[block, voxel]
+        truths = np.int64(store.cells[block, voxel]) & CELL_TRUTHS
         if occupied[i]:
-            put(store, block, voxel, model.highest, (flags & ~EXPLAINED) | EVER_HIT, model.occupied)
+            put(store, block, voxel, highest | (truths & ~CELL_EXPLAINED) | CELL_EVER_HIT)
         else:
-            put(store, block, voxel, model.lowest, flags, model.occupied)
+            put(store, block, voxel, lowest | truths)
 
 
 @njit(cache=True, nogil=True)
-def mark_explained(store, model, numbers, explained):
+def mark_explained(store, numbers, explained):
     """The voxels of these numbers (N,), -1: none, become explained or not."""
     for i in range(numbers.size):
         if numbers[i] < 0:
             continue
         block, voxel = numbers[i] // VOXELS, numbers[i] % VOXELS
-        flags = store.flags[block, voxel] & ~EXPLAINED
-        if explained[i]:
-            flags |= EXPLAINED
-        put(store, block, voxel, store.log_odds[block, voxel], flags, model.occupied)
+        cell = np.int64(store.cells[block, voxel]) & ~CELL_EXPLAINED
+        put(store, block, voxel, cell | CELL_EXPLAINED if explained[i] else cell)

@@ -53,7 +53,8 @@ def _insert(name: str, points: F64) -> Case:
     ours_s, voxels = _best_of(7, ours)
     theirs_s, _ = _best_of(2 if len(points) <= 100_000 else 1, theirs)
     enough = _yes(theirs_s / ours_s, 10.0)
-    note = f"{voxels.voxel_count:,} voxels, {voxels.size_bytes / 1e6:.1f} MB (at least 10 times: {enough})"
+    each_bytes = voxels.size_bytes / voxels.voxel_count
+    note = f"{voxels.voxel_count:,} voxels, {each_bytes:.1f} bytes each (at least 10 times: {enough})"
     title = f"insert {len(points):,} points, {name}, into an empty map of {RESOLUTION_M} m, {RANGE_M:.0f} m"
     return f"{title}, against OctoMap with discretize", ours_s, theirs_s, theirs_s / ours_s, note
 

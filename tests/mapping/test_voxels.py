@@ -275,7 +275,7 @@ def test_a_map_that_contradicts_itself_is_refused(options: dict[str, float], sai
     [
         ({"resolution_m": 1e-9}, "1.07 m"),
         ({"resolution_m": 0.5, "memory_limit_bytes": 1_000}, "1,000 bytes"),
-        ({"resolution_m": 0.01, "reach_m": 40.0}, r"67,020,643,277 voxels of 0.01 m.*Choose 0.07 m or coarser"),
+        ({"resolution_m": 0.01, "reach_m": 40.0}, r"67,020,643,277 voxels of 0.01 m.*Choose 0.06 m or coarser"),
         ({"resolution_m": 0.001, "reach_m": 120.0}, "120,000 voxels of 0.001 m"),
     ],
 )

@@ -153,7 +153,7 @@ def test_a_fine_map_of_the_camera_is_refused_with_what_would_do(recording: Path,
     assert code == 2
     assert isinstance(found["error"], dict)
     assert "One look out to 40 m" in found["error"]["what"]
-    assert "0.07 m or coarser" in found["error"]["advice"]
+    assert "0.06 m or coarser" in found["error"]["advice"]
 
 
 def test_the_radars_gate_may_be_another_than_in_flight(recording: Path, tmp_path: Path) -> None:

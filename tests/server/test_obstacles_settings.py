@@ -72,7 +72,7 @@ def test_map_and_vehicle_are_published_and_kept(desk: Desk) -> None:
 @pytest.mark.parametrize(
     ("fields", "where", "what", "advice"),
     [
-        ({"vision_resolution_m": 0.06}, "vision map", "One look out to 40 m", "0.07 m or coarser"),
+        ({"vision_resolution_m": 0.05}, "vision map", "One look out to 40 m", "0.06 m or coarser"),
         ({"vision_resolution_m": 0.25, "memory_limit_bytes": GB // 100}, "vision map", "10 MB", "0.324 m or coarser"),
         ({"memory_limit_bytes": 3 * GB}, "memory", "12,000 MB; this computer has 8,000 MB", "2,000 MB"),
         ({"radar_resolution_m": 0.2}, "radar map", "A corridor 120 m long and 1.6 m wide at 0.2 m", "m or coarser"),

@@ -1,0 +1,80 @@
+"""What a map costs, how its arrays grow without losing anything, and what it does when they are full."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+
+from mapping.voxels import store
+from mapping.voxels.map import VoxelMap
+from tests.mapping.clouds import seen_by_camera
+from tests.mapping.test_voxels import ORIGIN, content, small_map
+
+
+def test_no_change_is_lost_while_the_log_grows_with_the_map(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store, "FIRST_LOG", 16)
+    voxels, rng = small_map(1.0), np.random.default_rng(4)
+    followed: dict[tuple[int, ...], tuple[float, bool]] = {}
+    revision, wholes = 0, []
+    for scan in range(900):
+        voxels.insert_hits(rng.uniform(-8.0, 8.0, (4, 3)))
+        if scan % 3 != 2:
+            continue  # a growth lies between the changes that are asked for
+        changes = voxels.changed_since(revision)
+        wholes.append(changes.whole)
+        values = zip(changes.probability.tolist(), changes.explained.tolist(), strict=True)
+        followed.update(zip(map(tuple, changes.keys.tolist()), values, strict=True))
+        revision = changes.revision
+    assert voxels.blocks.counts[store.LOG_MASK] + 1 == 1024
+    assert not any(wholes)
+    assert followed == content(voxels)
+
+
+def test_another_thread_finds_what_was_there_while_the_table_grows(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(store, "FIRST_TABLE", 4)
+    voxels = VoxelMap(resolution_m=1.0, memory_limit_bytes=40_000_000)
+    first = np.array([[0.5, 0.5, 0.5], [100.5, 0.5, 0.5]])
+    voxels.insert_hits(first)
+    missed, ends = [], threading.Event()
+
+    def look() -> None:
+        while not ends.is_set():
+            missed.extend(np.flatnonzero(~(voxels.probability(first) >= 0.7)))
+
+    reader = threading.Thread(target=look)
+    reader.start()
+    rng = np.random.default_rng(5)
+    for _ in range(40):
+        voxels.insert_hits(rng.uniform(-2_000.0, 2_000.0, (250, 3)))
+    ends.set()
+    reader.join()
+    assert missed == []
+    assert voxels.blocks.counts[store.TABLE_FIRST] >= 16_384
+
+
+def test_a_map_that_has_all_the_values_it_can_tell_apart_takes_the_next_higher_one() -> None:
+    usual, full = small_map(), small_map()
+    values, counts = full.blocks.values, full.blocks.counts
+    filling = np.linspace(-1.9, 3.4, store.VALUE + 1 - counts[store.N_VALUES], dtype=np.float32)
+    values[counts[store.N_VALUES] :] = filling
+    full.blocks.kinds[counts[store.N_VALUES] :] = np.where(filling > 0.0, store.KNOWN | store.OCCUPIED, store.KNOWN)
+    counts[store.N_VALUES] = store.VALUE + 1
+    rng = np.random.default_rng(6)
+    for _ in range(12):
+        cloud = rng.uniform(-6.0, 6.0, (20, 3))
+        for voxels in (usual, full):
+            voxels.insert(cloud, origin_enu=ORIGIN, max_range_m=10.0)
+    exact, rounded = content(usual), content(full)
+    assert exact.keys() == rounded.keys()
+    more = np.array([rounded[key][0] - exact[key][0] for key in exact])
+    assert more.min() >= -1e-6
+    assert 0.0 < more.max() < 0.01
+
+
+def test_what_a_camera_sees_costs_at_most_eight_bytes_a_voxel() -> None:
+    voxels = VoxelMap(resolution_m=0.5)
+    voxels.insert(seen_by_camera(50_000), origin_enu=ORIGIN, max_range_m=40.0)
+    assert voxels.voxel_count > 100_000
+    assert voxels.size_bytes / voxels.voxel_count <= 8.0
