@@ -26,6 +26,7 @@ ServerError
 ├── TargetError            no target of that name for a library, or one that cannot be read or written
 ├── DamagedError           something in such a target that is not what it is called
 ├── CertificateError       the console's certificate cannot be made, read or used
+├── StationError           to a command: a station that runs refused what it was asked, or does not answer
 └── StartError             settings or port that Hedgehop cannot start with
 
 ``telemetry.errors`` come through as they are. Like ``planning.errors``, every error says what is wrong, where, and
@@ -164,6 +165,12 @@ class CertificateError(ServerError):
     code = "certificate"
 
 
+class StationError(ServerError):
+    """``code`` becomes that of the station's own answer, where it gave one."""
+
+    code = "station"
+
+
 class StartError(ServerError):
     code = "start"
 
@@ -188,6 +195,7 @@ STATUS: dict[type[Exception], int] = {
     TargetError: 502,
     DamagedError: 422,
     CertificateError: 500,
+    StationError: 502,
     StartError: 503,
     TelemetryError: 502,
     AddressError: 422,

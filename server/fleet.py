@@ -116,7 +116,7 @@ class Fleet:
         if number is None:
             raise BadRequestError(
                 f"There are {len(self._flights)} vehicles, and the request names none.",
-                advice="Say the number of one in the header Hedgehop-Vehicle.",
+                advice="Say the number of one: in the header Hedgehop-Vehicle, or with --vehicle.",
             )
         if not (number.isascii() and number.isdecimal() and len(number) < 4):
             raise BadRequestError(f"Hedgehop-Vehicle is {number[:20]!r}, which is no number of a vehicle.")

@@ -11,6 +11,12 @@ from server.schemas import AdoptVehicle, ConnectLink, DisconnectLink, LeaseDoc, 
 router = APIRouter(prefix="/api", tags=["link"], responses=ERROR_RESPONSES)
 
 
+@router.get("/lease", response_model=LeaseDoc)
+async def lease(who: Who, flying: Fly) -> Response:
+    """Who is in charge, and whether somebody asks for it."""
+    return answer(flying.lease.doc_for(who.session_key))
+
+
 @router.post("/lease/take", response_model=LeaseDoc)
 async def take(who: Who, flying: Fly) -> Response:
     """Takes charge where nobody is, or where nothing is heard of who is; else asks them: they have 15 s to answer."""

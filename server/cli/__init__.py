@@ -56,7 +56,7 @@ class _Lazy(TyperGroup):
 
 
 class _Commands(_Lazy):
-    with_negative: ClassVar = frozenset({"goto"})
+    with_negative: ClassVar = frozenset({"goto", "home"})
     places: ClassVar = {
         "serve": (".serve_command.serve", examples.SERVE),
         "tls": (".door.tls_command.tls", examples.TLS),
@@ -68,6 +68,7 @@ class _Commands(_Lazy):
         "rally": (".places_command.rally", examples.RALLY),
         "fly": (".flights.fly_command.fly", examples.FLY),
         "goto": (".flights.goto_command.goto", examples.GOTO),
+        "home": (".flights.home_command.home", examples.HOME),
         "sim": (".sim_command.sim", examples.SIM),
         "review": (".review_command.review", examples.REVIEW),
         "scenario": (".scenario_command.scenario", examples.SCENARIO),

@@ -11,7 +11,9 @@ from typing import Any
 import httpx
 import pytest
 
+from server.app import origin_file
 from server.schemas import FlyState, ReviewDoc, Snapshot
+from tests.server.cli_runs import hedgehop
 from tests.server.running import PASSWORD
 from tests.server.simulated import QUICKLY_DOWN, simulated_vehicle
 from tests.server.station import PATIENCE_S, Station, ok, station
@@ -112,6 +114,18 @@ def test_without_a_vehicle_commands_say_so(planned: Station) -> None:
     answer = planned.http.post("/api/flight/arm")
     assert (answer.status_code, answer.json()["code"]) == (409, "no_vehicle")
     assert planned.http.post("/api/flight/check").status_code == 409
+
+
+def test_home_is_set_where_the_vehicle_stands_by_a_command(planned: Station, vehicle: str) -> None:
+    settings = planned.server.settings
+    origin_file(settings).write_text(planned.server.origin, encoding="ascii")
+    ok(planned.http.post("/api/lease/release"))
+    try:
+        run = hedgehop("home", "here", "--data-dir", settings.data_dir, "--json")
+        assert (run.code, run.json["set"], run.json["return"]) == (0, True, None), run.err
+        assert run.json["moves_m"] < 1.0
+    finally:
+        ok(planned.http.post("/api/lease/take"))
 
 
 def test_a_flight_is_uploaded_checked_flown_recorded_and_reviewed(planned: Station, vehicle: str) -> None:

@@ -165,6 +165,8 @@ def test_home_is_not_where_the_model_knows_no_ground_nor_on_a_height_that_nobody
                                     vertical_accuracy_m=0.02)  # fmt: skip
         with pytest.raises(NotAllowedError, match="By its receiver"):
             await stands.asked()
+        with pytest.raises(NotAllowedError, match="only be set where the vehicle stands"):
+            await stands.asked(20.0)
 
     runner.run(scenario())
 

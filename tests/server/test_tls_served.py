@@ -35,6 +35,7 @@ from server.scene.host import SUBPROTOCOL
 from server.schemas import AlarmsMessage, ServerMessage
 from tests.free_ports import free_port
 from tests.server import test_tls
+from tests.server.cli_runs import hedgehop
 
 files = test_tls.files
 """Certificates of a test's own, beside the station's."""
@@ -106,6 +107,12 @@ def test_the_link_is_https_and_signs_in_who_trusts_the_authority(
     assert "loop" in health
     with pytest.raises(httpx.ConnectError, match="self-signed certificate"):
         httpx.get(f"{station.origin}/api/health", timeout=60)
+
+
+def test_a_command_on_this_machine_reaches_the_station_by_its_own_authority(station: Secure) -> None:
+    run = hedgehop("home", "here", "--data-dir", station.files.folder.parent, "--json")
+    assert (run.code, run.json["error"]["code"]) == (1, "not_ready"), run.err
+    assert "No surface model is open" in run.err
 
 
 def test_who_signs_in_is_led_to_where_a_device_comes_to_trust_it(station: Secure, client: httpx.Client) -> None:

@@ -1,1 +1,1 @@
-"""``hedgehop fly`` and ``hedgehop goto``: what has a vehicle fly."""
+"""``hedgehop fly``, ``hedgehop goto`` and ``hedgehop home``: what has a vehicle fly, and where it returns to."""

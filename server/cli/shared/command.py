@@ -20,6 +20,7 @@ from typer.models import OptionInfo
 
 from planning.errors import DescribedError
 from server.cli.shared.output import end_progress, print_json, say
+from server.errors import StationError
 from telemetry.errors import AddressError, RecordingError, TelemetryError
 
 DONE, FAILED, WRONG_INPUT = 0, 1, 2
@@ -96,7 +97,8 @@ def _filled(group: Any, given: dict[str, Any]) -> Any:
 def refusing(*, as_json: bool) -> Iterator[None]:
     """Wrong input ends the command with exit code 2, a message on stderr and, if asked, as JSON on stdout.
 
-    What a vehicle, a link or nobody foresaw ends it with 1; in the last case the message says where it happened.
+    What a vehicle, a link, a running station or nobody foresaw ends it with 1; in the last case the message says where
+    it happened.
     """
     try:
         yield
@@ -105,7 +107,7 @@ def refusing(*, as_json: bool) -> Iterator[None]:
     except DescribedError as error:
         _answer_error(error.code, error.what, error.where, error.advice, as_json=as_json)
         in_flight = isinstance(error, TelemetryError) and not isinstance(error, AddressError | RecordingError)
-        raise typer.Exit(FAILED if in_flight else WRONG_INPUT) from None
+        raise typer.Exit(FAILED if in_flight or isinstance(error, StationError) else WRONG_INPUT) from None
     except OSError as error:
         what = f"{error.strerror or error}."
         advice = "Check the path, its permissions and the free space."

@@ -116,6 +116,11 @@ PARAMS_COMPARE = _examples(
     ("With a file", "hedgehop params compare before.param --link udpin:0.0.0.0:14550"),
     ("With another vehicle", "hedgehop params compare tcp:10.0.0.8:5760 --link tcp:10.0.0.7:5760"),
 )
+HOME = _examples(
+    ("Where the vehicle is", "hedgehop home here"),
+    ("Would home there be clear to return to", "hedgehop home -37.1245,175.6893 --check"),
+    ("The second vehicle's, for a script", "hedgehop home here --vehicle 2 --json"),
+)
 GOTO = _examples(
     ("Up to 8 m, and hold there", "hedgehop goto udpin:0.0.0.0:14550 take-off --dsm dsm.tif --height-m 8"),
     (

@@ -98,6 +98,9 @@ def _home_at(asked: WayAsked, place: tuple[float, float] | None) -> HomePlace:
     from planning.certificate.home_stand import ground_at
     from telemetry.flight.home_height import home_off_m
 
+    if place is not None and not is_in_the_air(asked.state):
+        what = "On the ground home can only be set where the vehicle stands: its height is known there alone."
+        raise NotAllowedError(what, where="home", advice="Ask for home here.")
     state, ground = asked.state, load_terrain(asked.terrain)
     lat_deg, lon_deg = _at(state) if place is None else place
     x_m, y_m = ground.xy_from_lat_lon(np.array([[lat_deg, lon_deg]]))[0]
