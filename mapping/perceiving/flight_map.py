@@ -19,7 +19,8 @@ class FlightMap:
     """
 
     def __init__(self, settings: Settings) -> None:
-        self.map = VoxelMap(resolution_m=settings.resolution_m, memory_limit_bytes=settings.memory_limit_bytes)
+        self._settings = settings
+        self.map = self._empty()
         self.part = 1
         self.why = ""
         """Of this part; empty for the first."""
@@ -37,16 +38,20 @@ class FlightMap:
             self.map.insert_hits(centres, explained=explained)  # Bigazzi 2022, fig. 5
 
     def begin_part(self, why: str, t_mono_s: float) -> None:
-        """Nothing while nothing has been seen."""
+        """Nothing while nothing has been seen. Another map: what the one before held was seen, too."""
         self._waiting = None
         if self.map.voxel_count == 0:
             return
-        self.map.clear()
+        self.map = self._empty()
         self.part, self.why, self.since_t_s = self.part + 1, why, t_mono_s
 
     def clear(self) -> None:
         self._waiting = None
         self.map.clear()
+
+    def _empty(self) -> VoxelMap:
+        limit = self._settings.memory_limit_bytes
+        return VoxelMap(resolution_m=self._settings.resolution_m, memory_limit_bytes=limit)
 
     def move(self, rotation: F64, shift_m: F64) -> None:
         """The frame becomes known: p -> ``rotation`` (3, 3) @ p + ``shift_m`` (3,), as sure as before."""

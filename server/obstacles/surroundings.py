@@ -12,6 +12,7 @@ import numpy as np
 
 from mapping.geometry.arrays import F64, I64, Bools
 from mapping.geometry.frames import LocalFrame, apart_m
+from mapping.perceiving.vision_perception import DIVERGED_M
 from server.errors import NotReadyError
 from server.heard.channel import Channel
 from server.heard.onboard import Aboard
@@ -34,6 +35,11 @@ _UNKNOWN = "what stands in the way is not known"
 _ASKED = "They are asked for; ask again."
 _STARTED = "See that it is started again"
 _MEANWHILE = "Until then hold, or steer clear by sight."
+SEEN_BEFORE = (
+    "The camera saw more near it before than its newest frame shows; that does not count. Look at Camera, flight in the"
+    " 3D view, or turn the nose there and ask again."
+)
+SEEN_BEFORE_LOST = "Not all is known here that the camera saw before its newest frame; that does not count."
 _EMPTY = "It counts again after the landing, or once you empty the maps."
 
 
@@ -115,6 +121,20 @@ def is_more_seen_near(
         if near.any() and not _are_beside(centres[near], _seen_enu_m(before, frame)):
             return True
     return False
+
+
+async def seen_before_near(
+    watch: Watch, maps: Sequence[Voxels], line_deg: Sequence[tuple[float, float]], within_m: float
+) -> str | None:
+    """In words, that the camera saw things on its way, so near to a line (lat_deg, lon_deg), of which ``maps`` tell
+    nothing; None where it did not. They do not count: nothing is ever taken out of the map of its whole flight, neither
+    a wrong match nor who walked by, and how far that map has turned or drifted without GNSS nobody measures."""
+    before = await asyncio.to_thread(watch.mirrors["vision_flight"].seen_so_far)
+    status = watch.statuses.get("vision")
+    drift_m = max(DIVERGED_M, 0.0 if status is None else status.divergence_m or 0.0)
+    if await asyncio.to_thread(is_more_seen_near, maps, before, line_deg, within_m + drift_m):
+        return SEEN_BEFORE
+    return SEEN_BEFORE_LOST if watch.is_lacking("vision_flight") else None
 
 
 def returns_from(

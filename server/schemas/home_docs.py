@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
+from pydantic import Field
+
 from server.schemas.plan_docs import PlaceDoc
 from server.schemas.result_docs import ReasonDoc
 from server.schemas.strict_model import Strict
@@ -32,6 +34,8 @@ class ReturnDoc(Strict):
     """Smallest distance to the surface; null: nothing is near, or not judged."""
     instead: bool = False
     """A guided way home is certified where the return is not."""
+    notes: list[str] = Field(default_factory=list)
+    """Sentences: what of the surroundings did not count."""
     judged_mono_s: float
     """By the server's clock."""
 

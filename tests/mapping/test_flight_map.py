@@ -136,6 +136,18 @@ def test_a_moved_map_is_as_sure_as_before() -> None:
     assert whole.map.occupied_count == 2
 
 
+def test_a_new_part_is_another_map_so_that_what_the_one_before_held_is_not_taken_for_gone() -> None:
+    whole = FlightMap(Settings(resolution_m=0.5))
+    first = whole.map
+    whole.begin_part("The camera's path jumped by 3.0 m", 1.0)
+    assert whole.map is first, "nothing was seen yet"
+    whole.take(np.array([[0.25, 0.25, 0.25]]), None)
+    whole.put_in()
+    whole.begin_part("The camera's path jumped by 3.0 m", 2.0)
+    assert (whole.part, whole.map.occupied_count, first.occupied_count) == (2, 0, 1)
+    assert whole.map is not first
+
+
 def test_it_is_emptied_and_begun_anew_with_the_local_one() -> None:
     flight = flying()
     fly(flight, 5)

@@ -19,6 +19,7 @@ from server.flying.in_flight.home_desk import HomeDesk
 from server.flying.in_flight.way_desk import WayDesk
 from server.heard.channel import Channel
 from server.obstacles.obstacle_watch import Watch
+from server.obstacles.surroundings import SEEN_BEFORE
 from server.schemas import HomeAskedDoc, HomeBody, HomeState, ReturnDoc, SetHomeBody
 from server.schemas.flight_docs import CHECK_FRESH_S
 from server.work.jobs import Lane
@@ -242,9 +243,12 @@ def test_a_home_near_whose_return_more_is_seen_since_it_was_judged_is_not_set(
         told: dict[str, Any] = {"origin": origin, "resolution_m": 1.0, "began_mono_s": 1.0}
         aside = [(10, 12, 1), (10, 12, 2)]
         radar.fold(delta(aside, whole=True, **told))
+        before = delta([(10, -9, 2)], sensor="vision_flight", whole=True, **told)
+        bench.watch.mirrors["vision_flight"].fold(before)
         doc = await bench.asked(20.0)
         assert doc.ret is not None
         assert doc.ret.state == "certified", doc.ret.reasons
+        assert doc.ret.notes == [SEEN_BEFORE], "it does not count, and is said"
         mast = [(10, 0, up) for up in range(3)]
         radar.fold(delta(mast, since=1, revision=2, **told))
         with pytest.raises(CheckNeededError, match="seen more near the return to that home") as refused:

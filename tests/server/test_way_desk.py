@@ -24,7 +24,7 @@ from server.flying.in_flight.way_desk import WayDesk, flown_places
 from server.flying.in_flight.way_task import WayJudged, wish_of
 from server.heard.channel import Channel, ShownWay
 from server.obstacles.obstacle_watch import Watch
-from server.obstacles.surroundings import _is_near, is_more_seen_near, returns_from
+from server.obstacles.surroundings import SEEN_BEFORE, _is_near, is_more_seen_near, returns_from
 from server.scene.mirror import MapMirror
 from server.schemas import FenceDoc, FlyWayBody, GuidedState, PlaceDoc, WayBody, WayDoc, WaySpeedBody
 from server.schemas.flight_docs import CHECK_FRESH_S
@@ -231,8 +231,11 @@ def test_a_way_near_which_more_is_seen_since_it_was_judged_is_not_flown(
         told = {"origin": origin, "began_mono_s": 1.0}
         old = [(-200, 0, 3), (0, -29, 1)]
         radar.fold(delta(old, whole=True, revision=1, **told))
+        before = delta([(12, 5, 9)], sensor="vision_flight", whole=True, **told)
+        bench.watch.mirrors["vision_flight"].fold(before)
         way = await bench.judged(action="to", place=bench.beside(30.0, 0.0), height_m=20.0)
         assert way.problem is None
+        assert SEEN_BEFORE in way.notes, "it does not count, and is said"
         # Near it only known ground and what it was judged by; something else far away.
         radar.fold(delta([(15, 0, 0)], explained=1, since=1, revision=2, **told))
         radar.fold(delta([(0, -29, 1), (15, 90, 34), (300, 0, 9)], 250, since=2, revision=3, **told))

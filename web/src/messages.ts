@@ -1802,6 +1802,8 @@ export interface ReturnDoc {
   clearance_m: number | null;
   /** A guided way home is certified where the return is not. */
   instead: boolean;
+  /** Sentences: what of the surroundings did not count. */
+  notes: string[];
   /** By the server's clock. */
   judged_mono_s: number;
 }

@@ -9,6 +9,7 @@ const CLEAR: ReturnDoc = {
   reasons: [],
   clearance_m: 4.2,
   instead: false,
+  notes: [],
   judged_mono_s: 100,
 };
 const BLOCKED: ReturnDoc = {
@@ -50,6 +51,6 @@ describe("its age", () => {
   it("counts by the server's clock", () => {
     takeClock({ v: 1, type: "clock", page_ms: 1000, now_mono_s: 130 }, 1000);
     expect(returnAge_s(CLEAR, 1000)).toBeCloseTo(30, 3);
-    expect(returnAge_s({ ...CLEAR, judged_mono_s: 140 }, 1000)).toBe(0);
+    expect(returnAge_s({ ...CLEAR, notes: [], judged_mono_s: 140 }, 1000)).toBe(0);
   });
 });

@@ -96,6 +96,7 @@ def _summary(asked: HomeAskedDoc) -> dict[str, Any]:
             "clearance_m": ret.clearance_m,
             "reasons": [reason.text for reason in ret.reasons],
             "way_home_certified": ret.instead,
+            "notes": ret.notes,
         },
     }
 
@@ -111,7 +112,8 @@ def _lines(asked: HomeAskedDoc, *, is_set: bool) -> list[str]:
 def _return_lines(ret: ReturnDoc) -> list[str]:
     if ret.state == "certified":
         by = "nothing is near" if ret.clearance_m is None else f"clear by {ret.clearance_m:.1f} m"
-        return [f"  Return: CERTIFIED, {by}"]
+        return [f"  Return: CERTIFIED, {by}", *(f"  {note}" for note in ret.notes)]
     lines = [f"  Return: {'NOT CERTIFIED' if ret.state == 'not_certified' else 'UNKNOWN'}"]
     lines += [f"  - {reason.text} {reason.mend}".rstrip() for reason in ret.reasons]
-    return [*lines, *(["  A guided way home is certified."] if ret.instead else [])]
+    lines += ["  A guided way home is certified."] if ret.instead else []
+    return [*lines, *(f"  {note}" for note in ret.notes)]

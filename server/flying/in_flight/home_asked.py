@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mapping.geometry.frames import apart_m
@@ -11,7 +12,7 @@ from server.flying.in_flight.home_task import Led
 from server.flying.in_flight.way_desk import WayDesk
 from server.obstacles.surroundings import returns_from
 from server.scene.mirror import Voxels
-from server.schemas import HomeAskedDoc
+from server.schemas import HomeAskedDoc, ReturnDoc
 from server.schemas.flight_docs import CHECK_FRESH_S
 from telemetry.flight.guided.beginning import why_moves
 from telemetry.flight.home_watch import home_of, is_there
@@ -52,17 +53,25 @@ class AskedHome:
         """Raises CheckNeededError where more was seen near a way to that home or to a rally point that was said to be
         certified, from where the vehicle was or is; NotReadyError where nobody knows. Guided ways are not flown then,
         either."""
-        ret = self.doc.ret
-        if now is None or ret is None or not (ret.state == "certified" or ret.instead):
+        if now is None or self.doc.ret is None:
             return
-        led, places = self.led, [place for place in (_place(self.state), _place(now)) if place is not None]
-        # A guided way promises no other return.
-        ends = () if ret.instead else ((self.doc.lat_deg, self.doc.lon_deg), *led.rally_deg)
-        line_deg = [*reversed(places), *led.instead_deg] if ret.instead else returns_from(places, ends, led.required_m)
-        if await ways.has_seen_more_near(self.maps, line_deg, led.required_m):
+        line_deg = looked_along(self.doc.ret, self.led, (self.doc.lat_deg, self.doc.lon_deg), (self.state, now))
+        if line_deg and await ways.has_seen_more_near(self.maps, line_deg, self.led.required_m):
             what = "Sensors have seen more near the return to that home since it was judged."
             # Who flies on sees more all the while.
             raise CheckNeededError(what, advice=AGAIN if why_moves(now) is None else "Hold, then ask for home again.")
+
+
+def looked_along(
+    ret: ReturnDoc, led: Led, home_deg: tuple[float, float], states: Sequence[VehicleState]
+) -> list[tuple[float, float]]:
+    """(lat_deg, lon_deg) along what was said to be certified, from where the vehicle was; empty where nothing was."""
+    if not (ret.state == "certified" or ret.instead):
+        return []
+    places = [place for place in map(_place, states) if place is not None]
+    if ret.instead:  # a guided way promises no other return
+        return [*reversed(places), *led.instead_deg]
+    return returns_from(places, (home_deg, *led.rally_deg), led.required_m)
 
 
 def _place(state: VehicleState) -> tuple[float, float] | None:

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from mapping.errors import DescribedError
 from mapping.geometry.frames import apart_m
 from server.errors import ConflictError, NotFoundError, reported
-from server.flying.in_flight.home_asked import AskedHome
-from server.flying.in_flight.home_task import HomeJudged, judge_home, judge_return
+from server.flying.in_flight.home_asked import AskedHome, looked_along
+from server.flying.in_flight.home_task import HomeJudged, Led, judge_home, judge_return
 from server.flying.in_flight.way_desk import WayDesk
 from server.flying.in_flight.way_task import WayAsked
 from server.heard.channel import Channel
@@ -124,9 +124,11 @@ class HomeDesk:
             asked = await self._ways.asked(operator, ANYWHERE)
             place = None if body.place is None else (body.place.lat_deg, body.place.lon_deg)
             judged: HomeJudged = await self._lane.call(judge_home, asked, place)
+            home_deg = (judged.home.lat_deg, judged.home.lon_deg)
+            ret = None if judged.ret is None else await self._noted(judged.ret, judged.led, home_deg, asked)
             if vehicle != self._adopted:
                 raise ConflictError("Another vehicle was adopted meanwhile.", advice="Ask for home again.")
-            doc = self._doc(judged, asked.state, is_here=place is None)
+            doc = self._doc(replace(judged, ret=ret), asked.state, is_here=place is None)
             self._asked = AskedHome(doc, time.monotonic(), asked.state, asked.maps, judged.led)
         finally:
             self._is_judging = False
@@ -299,11 +301,19 @@ class HomeDesk:
         asked = self._gathered or await self._ways.asked(self._server(), ANYWHERE)
         self._gathered = asked = await self._ways.renewed(asked)
         began_s = time.monotonic()
-        doc: ReturnDoc = await self._lane.call(judge_return, asked)
+        doc, led = await self._lane.call(judge_return, asked)
         self._took_s = time.monotonic() - began_s
+        if (home := home_of(asked.state)) is not None:
+            doc = await self._noted(doc, led, (home.lat_deg, home.lon_deg), asked)
         if self._gathered is asked:
             return doc
         return _unknown("What the vehicle holds was changed meanwhile.", "It is being judged anew.")
+
+    async def _noted(self, ret: ReturnDoc, led: Led, home_deg: tuple[float, float], asked: WayAsked) -> ReturnDoc:
+        """With what does not count, and is to be said."""
+        line_deg = looked_along(ret, led, home_deg, (asked.state,))
+        notes = await self._ways.seen_before(asked.maps, line_deg, led.required_m) if line_deg else []
+        return ret.model_copy(update={"notes": notes})
 
     def _doc(self, judged: HomeJudged, state: VehicleState, *, is_here: bool) -> HomeAskedDoc:
         home, now = judged.home, home_of(state)

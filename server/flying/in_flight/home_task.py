@@ -54,9 +54,9 @@ def judge_home(asked: WayAsked, place: tuple[float, float] | None, *, report: Pr
     return HomeJudged(home, *_judged_return(there, report))
 
 
-def judge_return(asked: WayAsked, *, report: Progress) -> ReturnDoc:
+def judge_return(asked: WayAsked, *, report: Progress) -> tuple[ReturnDoc, Led]:
     """From where the vehicle is; where that is not certified, whether a guided way home is."""
-    return _judged_return(asked, report)[0]
+    return _judged_return(asked, report)
 
 
 def _judged_return(asked: WayAsked, report: Progress) -> tuple[ReturnDoc, Led]:

@@ -11,6 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
 
 from planning.errors import DescribedError
+from planning.formats.commands import has_position
+from planning.formats.wpl import read_wpl
 from planning.missions.vehicle_profile import parse_profile
 from server.errors import ConflictError, JobCancelledError, NotReadyError
 from server.flying.in_flight.take_up_task import AskedTakeUp, MadeTakeUp, check_take_up, make_take_up
@@ -19,9 +21,10 @@ from server.heard.channel import Channel
 from server.heard.onboard import Aboard
 from server.library import Library
 from server.library.terrain_of import FlownOver, terrain_of
+from server.obstacles.coming_down_task import SHADOW_M
 from server.obstacles.obstacle_watch import Watch
-from server.obstacles.surroundings import seen_maps
-from server.schemas import TakeUpPlan
+from server.obstacles.surroundings import returns_from, seen_before_near, seen_maps
+from server.schemas import TakenUpDoc, TakeUpPlan
 from server.work.jobs import Lane
 from server.workspace import Workspace
 from telemetry.bus.link_client import LinkClient
@@ -186,7 +189,14 @@ class TakingUp:
         battery = made.doc.battery
         if battery.state != "good" and (battery.state != "accept" or "battery" not in body.accept):
             raise NotAllowedError(battery.text, where="battery", advice=battery.mend)
-        return asked, made
+        return asked, replace(made, doc=await self._noted(made, asked))
+
+    async def _noted(self, made: MadeTakeUp, asked: AskedTakeUp) -> TakenUpDoc:
+        """With what does not count, and is to be said."""
+        within_m = made.doc.required_m + SHADOW_M
+        line_deg = await asyncio.to_thread(_looked_along, made, asked, within_m)
+        words = await seen_before_near(self._watch, asked.maps, line_deg, within_m)
+        return made.doc if words is None else made.doc.model_copy(update={"notes": [*made.doc.notes, words]})
 
     async def certificate(
         self, operator: Operator, asked: AskedTakeUp, onboard: OnboardMission
@@ -240,6 +250,13 @@ class TakingUp:
         if self._live.state is None:
             raise NoVehicleError("No vehicle is connected.", advice="Connect one first.")
         return self._live.state
+
+
+def _looked_along(made: MadeTakeUp, asked: AskedTakeUp, within_m: float) -> list[tuple[float, float]]:
+    """(lat_deg, lon_deg) along the way and the rest, and straight from there to home."""
+    mission, home = read_wpl(made.record.mission_wpl), home_of(asked.state)
+    turns = [(item.lat_deg, item.lon_deg) for item in mission.items if has_position(item)]
+    return returns_from([made.begins[:2], *turns], [] if home is None else [(home.lat_deg, home.lon_deg)], within_m)
 
 
 def with_words(error: E, words: str) -> E:

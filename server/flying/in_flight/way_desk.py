@@ -22,6 +22,7 @@ from server.obstacles.surroundings import (
     is_same_seen,
     maps_revision,
     returns_from,
+    seen_before_near,
     seen_maps,
 )
 from server.scene.mirror import Voxels
@@ -109,8 +110,10 @@ class WayDesk:
         try:
             asked = await self.asked(operator, body)
             judged: WayJudged = await self._lane.call(judge_way, asked)
+            home = home_of(asked.state)
+            notes = await self.seen_before(asked.maps, _looked_along(judged, home), _required_m(judged))
             self._check_still(vehicle, flown)
-            doc, home = _doc(judged, body, terrain), home_of(asked.state)
+            doc = _doc(judged, body, terrain, notes)
             self._in_hand = _InHand(doc, judged, time.monotonic(), home, asked.maps)
         finally:
             self._is_judging = False
@@ -243,18 +246,20 @@ class WayDesk:
         near_m = clearance_m + (SHADOW_M if is_in_the_air(self._vehicle()) else 0.0)
         return await asyncio.to_thread(is_more_seen_near, maps, seen, line_deg, near_m)
 
+    async def seen_before(
+        self, maps: tuple[Voxels, ...], line_deg: list[tuple[float, float]], clearance_m: float
+    ) -> list[str]:
+        """What does not count, and is to be said of a line (lat_deg, lon_deg) that keeps such a clearance."""
+        words = await seen_before_near(self._watch, maps, line_deg, clearance_m + SHADOW_M)
+        return [] if words is None else [words]
+
     # How
 
     async def _check_seen(self, in_hand: _InHand) -> None:
         """Raises CheckNeededError where sensors have seen more near the way, or near a return from anywhere on it that
         is certified with it, since it was judged; NotReadyError where nobody knows."""
-        way, home, required_m = in_hand.judged.way, in_hand.home, in_hand.judged.way.certificate.required_clearance_m
-        places = [place[:2] for place in way.places]
-        ends = [] if home is None else [(home.lat_deg, home.lon_deg)]
-        line_deg = [*places, *ends]
-        if way.problem is None and not isinstance(in_hand.judged.wish, RETURNS):
-            line_deg = returns_from(places, [*ends, *in_hand.judged.rally_deg], required_m)
-        sees_more = await self.has_seen_more_near(in_hand.maps, line_deg, required_m)
+        line_deg = _looked_along(in_hand.judged, in_hand.home)
+        sees_more = await self.has_seen_more_near(in_hand.maps, line_deg, _required_m(in_hand.judged))
         if self._in_hand is not in_hand:
             raise NotFoundError(NOWHERE, advice="Ask for the way again.")
         if sees_more:
@@ -303,13 +308,26 @@ class WayDesk:
         self._pages.publish(GuidedMessage(guided=self.state))
 
 
-def _doc(judged: WayJudged, body: WayBody, terrain: TerrainDoc) -> WayDoc:
+def _required_m(judged: WayJudged) -> float:
+    return judged.way.certificate.required_clearance_m
+
+
+def _looked_along(judged: WayJudged, home: HomePlace | None) -> list[tuple[float, float]]:
+    """(lat_deg, lon_deg) along the way, and along each return from anywhere on it that is certified with it."""
+    places = [place[:2] for place in judged.way.places]
+    ends = [] if home is None else [(home.lat_deg, home.lon_deg)]
+    if judged.way.problem is None and not isinstance(judged.wish, RETURNS):
+        return returns_from(places, [*ends, *judged.rally_deg], _required_m(judged))
+    return [*places, *ends]
+
+
+def _doc(judged: WayJudged, body: WayBody, terrain: TerrainDoc, notes: list[str]) -> WayDoc:
     way = judged.way
     return WayDoc(
         id=secrets.token_hex(8),
         action=body.action,
         problem=way.problem,
-        notes=way_notes(way),
+        notes=[*way_notes(way), *notes],
         reasons=[ReasonDoc(code=reason.code, text=reason.text, mend=reason.mend) for reason in way.certificate.reasons],
         clearance_m=way.clearance_m if math.isfinite(way.clearance_m) else None,
         required_m=way.certificate.required_clearance_m,

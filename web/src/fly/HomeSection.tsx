@@ -31,6 +31,9 @@ function Return({ ret, isAnew = false }: { ret: ReturnDoc; isAnew?: boolean }) {
       </WayVerdict>
       {isClear ? <p>Clear by {clearance(ret.clearance_m ?? null)}.</p> : <WayReasons reasons={ret.reasons} />}
       {ret.instead && <p>A way home is certified: Guided flight, Home.</p>}
+      {ret.notes.map((note) => (
+        <p key={note}>{note}</p>
+      ))}
     </div>
   );
 }
