@@ -133,7 +133,7 @@ def is_plan(record: PlanRecord, document: PlanDoc) -> bool:
 def _flown_part(document: dict[str, object]) -> dict[str, object]:
     # Plans from before obstacles, or a fence, could be taken into them do not say that none were.
     flown = {"seen_id": None, "fence": FenceDoc().model_dump(mode="json"), "rally": []} | document
-    return {key: value for key, value in flown.items() if key not in ("name", "orthophoto_id")}
+    return {key: value for key, value in flown.items() if key not in ("name", "orthophoto_id", "seen_lacks")}
 
 
 def read_onboard(file: Path) -> Onboard | None:

@@ -17,7 +17,7 @@ from server.obstacles.manoeuvres import Manoeuvres
 from server.obstacles.obstacle_watch import Watch
 from server.obstacles.rest_of_plan import rest_of_plan
 from server.obstacles.section import map_file
-from server.obstacles.surroundings import Surroundings
+from server.obstacles.surroundings import Surroundings, is_more_than
 from server.plan.plan_requests import PlanRequests
 from server.scene.mirror import MapMirror
 from server.schemas import (
@@ -139,8 +139,8 @@ class ObstacleDesk:
         await self._link.call(await self._manoeuvres.request(operator, manoeuvre_id))
 
     async def plan_with_seen(self, body: PlanWithSeen) -> PlanState:
-        """With what was seen before a map began anew in this flight; where something is missing, the edit's words say
-        so. Raises NotReadyError when nothing was seen, and for a part when no mission is flown."""
+        """With what was seen before a map began anew in this flight; where something is missing, the plan says so, and
+        the edit's words. Raises NotReadyError when nothing was seen, and for a part when no mission is flown."""
         if not body.seen:
             return await self._plans.plan_without_seen()
         mirrors = [self._live.mirrors[sensor] for sensor in dict.fromkeys(body.sensors)]
@@ -159,7 +159,12 @@ class ObstacleDesk:
         began_anew = [mirror for mirror in mirrors if mirror.kept_count]
         also = f", also before {_maps(began_anew)} began anew" if began_anew else ""
         but = f", but not all: {missing}" if lacking else ""
-        seen = maps, live.state, home_of_takeoff(live.track.states), f"Plan against what was seen{also}{but}"
+        words = f"Plan against what was seen{also}{but}"
+        lacks = [f"{missing.capitalize()}."] if lacking else []
+        before = await asyncio.to_thread(self._live.mirrors["vision_flight"].seen_so_far)
+        if "vision" in body.sensors and await asyncio.to_thread(is_more_than, maps, before):
+            lacks.append("What the camera saw before its newest frame is not in it.")
+        seen = maps, live.state, home_of_takeoff(live.track.states), words, " ".join(lacks)
         if body.part == "whole":
             return await self._plans.plan_with_seen(*seen)
         part, underway = body.part, self._around.underway

@@ -123,6 +123,17 @@ def is_more_seen_near(
     return False
 
 
+def is_more_than(maps: Sequence[Voxels], other: Sequence[Voxels]) -> bool:
+    """Whether ``other`` holds things farther than ``SAME_M`` from all that ``maps`` hold, and that the surface model
+    does not explain. For a thread."""
+    for map_ in other:
+        if (origin := map_.origin) is not None and not map_.explained.all():
+            frame = LocalFrame(origin.lat_deg, origin.lon_deg, origin.alt_amsl_m)
+            if not _are_beside(map_.centres_enu_m[~map_.explained], _seen_enu_m(maps, frame)):
+                return True
+    return False
+
+
 async def seen_before_near(
     watch: Watch, maps: Sequence[Voxels], line_deg: Sequence[tuple[float, float]], within_m: float
 ) -> str | None:

@@ -128,12 +128,14 @@ class PlanRequests:
         state: VehicleState | None,
         took_off: HomePlace | None,
         words: str,
+        lacks: str,
         rest: Callable[[str], dict[str, Any]] | None = None,
     ) -> PlanState:
         """Raises the open plan's surface model where the maps have unexplained voxels; an edit like any other.
 
-        ``state`` and ``took_off`` are the vehicle's, as in ``keep_seen``; ``words`` name the edit; ``rest`` gives,
-        of the terrain's id, the fields of a plan that begins where the vehicle is.
+        ``state`` and ``took_off`` are the vehicle's, as in ``keep_seen``; ``words`` name the edit; ``lacks``: what was
+        seen and is not in the maps, in words; ``rest`` gives, of the terrain's id, the fields of a plan that begins
+        where the vehicle is.
         """
         terrain_id = self._desk.document.terrain_id
         if terrain_id is None:
@@ -141,12 +143,16 @@ class PlanRequests:
         fields = {} if rest is None else await asyncio.to_thread(rest, terrain_id)
         directory = self._library.terrain_dir(terrain_id)
         fields["seen_id"] = await self._lane.call(tasks.keep_seen, directory, maps, state, took_off)
+        fields["seen_lacks"] = lacks
         await self._desk.propose(lambda document: (words, document.model_copy(update=fields)))
         return self.state
 
     async def plan_without_seen(self) -> PlanState:
         await self._desk.propose(
-            lambda document: ("Plan without what was seen", document.model_copy(update={"seen_id": None}))
+            lambda document: (
+                "Plan without what was seen",
+                document.model_copy(update={"seen_id": None, "seen_lacks": ""}),
+            )
         )
         return self.state
 

@@ -165,6 +165,8 @@ class PlanDoc(Strict):
     orthophoto_id: str | None = None
     seen_id: str | None = None
     """What was seen and raises the surface model as columns; None: the model is as it was read."""
+    seen_lacks: Annotated[str, StringConstraints(max_length=300)] = ""
+    """Sentences: what was seen, and is not among these columns."""
     source: Literal["pois", "survey"] = "pois"
     pois: list[PoiDoc] = Field(default=[], max_length=5000)
     survey: SurveyDoc = SurveyDoc()

@@ -16,12 +16,12 @@ from planning.terrain.dsm import Dsm
 from server.flying.scenery import Scenery
 from server.heard.channel import Channel
 from server.heard.flown_track import POINTS_MAX, Track
-from server.heard.onboard import rounded_note
+from server.heard.onboard import is_plan, rounded_note
 from server.library.terrain_of import FlownOver, covers, terrain_of
 from server.scene.layers.vehicles import Vehicles
-from server.schemas import PlaceDoc, ReviewSeries, TerrainDoc
+from server.schemas import PlaceDoc, PlanDoc, ReviewSeries, TerrainDoc
 from server.work.bucket import Bucket
-from telemetry.topics.messages import LOST_S
+from telemetry.topics.messages import LOST_S, PlanRecord
 from telemetry.topics.onboard_lists import Rounded
 from telemetry.topics.vehicle import VehicleState
 
@@ -214,3 +214,10 @@ def test_the_surface_model_of_a_recording(flown: FlownOver, found: str | None) -
 @given(st.floats(36.5, 38.5), st.floats(14.5, 16.5))
 def test_inside_the_corners(lat_deg: float, lon_deg: float) -> None:
     assert covers(WIDE, lat_deg, lon_deg) == (37.0 <= lat_deg <= 38.0 and 15.0 <= lon_deg <= 16.0)
+
+
+def test_words_about_a_plan_make_it_no_other_one_to_fly() -> None:
+    flown = PlanDoc(name="Hill", seen_id="0123456789abcdef", seen_lacks="Parts of the radar map are missing.")
+    record = PlanRecord(0.0, "", "", "", "px4", "", "", "", None, None, "", "", plan_json=flown.model_dump_json())
+    assert is_plan(record, flown.model_copy(update={"seen_lacks": "", "name": "Slope"}))
+    assert not is_plan(record, flown.model_copy(update={"seen_id": None}))

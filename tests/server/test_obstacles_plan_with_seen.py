@@ -25,11 +25,13 @@ class Desk:
 
     def __init__(self, folder: Path) -> None:
         self.watch, self.planned = Watch("live", Told()), list[tuple[set[tuple[int, ...]], str]]()
+        self.lacks = list[str]()
         me, nobody = cast(Any, self), cast(Any, None)
         self.live = SimpleNamespace(state=None, track=SimpleNamespace(states=[]))
         self.desk = ObstacleDesk(folder, {"live": self.watch}, nobody, me, nobody, me, nobody, nobody, nobody)
 
-    async def plan_with_seen(self, maps: list[Voxels], _state: Any, _took_off: Any, words: str) -> None:
+    async def plan_with_seen(self, maps: list[Voxels], _state: Any, _took_off: Any, words: str, lacks: str) -> None:
+        self.lacks.append(lacks)
         self.planned.append(({tuple(key) for voxels in maps for key in voxels.keys.tolist()}, words))
 
     async def plans(self, *sensors: Any) -> tuple[set[tuple[int, ...]], str]:
@@ -75,6 +77,7 @@ def test_a_plan_against_half_of_what_was_seen_says_what_it_lacks(tmp_path: Path)
         lacks = f"{words}, but not all: parts of the radar map are missing"
         assert await desk.plans("radar", "vision") == ({TREE}, lacks), "nothing of it has come"
         assert await desk.plans("vision") == ({TREE}, words)
+        assert desk.lacks == ["Parts of the radar map are missing.", ""]
         await watch.on_map(delta([CRANE], whole=True, began_mono_s=12.0))
         (lost,) = [each.alert.text for each in watch.state.alerts if each.alert.id.startswith("forgot-radar")]
         assert "plans against what was seen are without it" in lost
@@ -86,5 +89,25 @@ def test_a_plan_against_half_of_what_was_seen_says_what_it_lacks(tmp_path: Path)
         assert await desk.plans("radar") == ({CRANE, MAST}, words)
         watch.awaited.add("radar")
         assert await desk.plans("radar") == ({CRANE, MAST}, lacks), "its node has not spoken to this server yet"
+
+    asyncio.run(scenario())
+
+
+def test_a_plan_says_that_only_the_cameras_newest_frame_is_in_it_where_it_saw_more(tmp_path: Path) -> None:
+    async def scenario() -> None:
+        desk = Desk(tmp_path)
+        watch = desk.watch
+        await watch.on_flight(flies=True)
+        before: Any = {"sensor": "vision_flight", "whole": True, "began_mono_s": 1.0}
+        await watch.on_map(delta([TREE], whole=True, began_mono_s=1.0, sensor="vision"))
+        await watch.on_map(delta([TREE], **before))
+        await desk.plans("radar", "vision")
+        await watch.on_map(delta([TREE, CRANE], revision=2, **before))
+        await desk.plans("radar", "vision")
+        await watch.on_map(delta([CRANE], whole=True, began_mono_s=1.0))
+        await desk.plans("radar", "vision")
+        await desk.plans("radar")
+        newest = "What the camera saw before its newest frame is not in it."
+        assert desk.lacks == ["", newest, "", ""], "the radar has seen the same crane"
 
     asyncio.run(scenario())

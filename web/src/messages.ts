@@ -895,6 +895,8 @@ export interface PlanDoc {
   orthophoto_id: string | null;
   /** What was seen and raises the surface model as columns; None: the model is as it was read. */
   seen_id: string | null;
+  /** Sentences: what was seen, and is not among these columns. */
+  seen_lacks: string;
   source: "pois" | "survey";
   pois: PoiDoc[];
   survey: SurveyDoc;

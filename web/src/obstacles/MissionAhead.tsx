@@ -64,6 +64,7 @@ const PARTS: readonly { part: SeenPart; label: string; title: string }[] = [
 /** Takes the maps into planning: what was seen becomes columns on the surface model. */
 function PlanAgainstSeen() {
   const isIn = document_.value?.seen_id != null;
+  const lacks = document_.value?.seen_lacks;
   const isBusy = pending.value.has(SEEN);
   const cannot = whyNotAsk.value;
   return (
@@ -93,7 +94,7 @@ function PlanAgainstSeen() {
       </div>
       {isIn && (
         <p class="seen-columns" data-testid="seen-columns">
-          What was seen is in the plan.{" "}
+          What was seen is in the plan.{lacks ? ` Not all: ${lacks} ` : " "}
           <button type="button" class="link" data-testid="seen-to-plan" onClick={() => goTo("plan")}>
             Look at it in Plan
           </button>

@@ -11,6 +11,7 @@ import { SEEN, planWithSeen } from "./obstacle_orders";
 /** In Plan: the surface model is not as it was read, and the way out of it. */
 export function SeenInPlan() {
   if (document_.value?.seen_id == null) return null;
+  const lacks = document_.value.seen_lacks;
   const columns = result.value?.seen_columns ?? 0;
   return (
     <div class="callout wrap-row seen-in-plan" data-testid="seen-in-plan">
@@ -20,6 +21,7 @@ export function SeenInPlan() {
           ? `${count(columns, "seen column")} on the surface model`
           : "What was seen is on the surface model"}
         : path and certificate keep clear of it. What only the radar has seen may be higher than that.
+        {lacks && <strong data-testid="seen-lacks"> Not all: {lacks}</strong>}
       </p>
       <Changes>
         <Button

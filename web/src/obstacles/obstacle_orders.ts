@@ -7,7 +7,7 @@ import type {
   PlanWithSeen,
   SetAvoidanceBody,
 } from "../messages";
-import { order } from "../store/outcomes";
+import { order, say } from "../store/outcomes";
 import { alerts } from "../store/obstacles";
 import { allSent, queue, showPlan } from "../store/plan";
 import { errors } from "../store/state";
@@ -86,13 +86,18 @@ const PLANNED: Record<SeenPart, string> = {
   home: "The way home is planned past what was seen.",
 };
 
+/** With what it lacks, if anything. */
+export const plannedWords = (part: SeenPart, lacks: string): string =>
+  lacks ? `${PLANNED[part]} Not all: ${lacks}` : PLANNED[part];
+
 /** Takes what was seen into the open plan's surface model, or out of it again: an edit that can be undone. */
 export async function planWithSeen(seen: boolean, part: SeenPart = "whole"): Promise<void> {
   await allSent();
   const body: PlanWithSeen = { seen, part };
-  const done = seen ? PLANNED[part] : "The plan is on the surface model alone.";
-  const answer = await order({ place: SEEN, method: "PUT", path: "/api/obstacles/seen", body, done });
+  const answer = await order({ place: SEEN, method: "PUT", path: "/api/obstacles/seen", body });
   if (!answer) return;
-  queue.takeAnswer((await answer.json()) as PlanState);
+  const state = (await answer.json()) as PlanState;
+  say(SEEN, seen ? plannedWords(part, state.document.seen_lacks) : "The plan is on the surface model alone.");
+  queue.takeAnswer(state);
   showPlan();
 }

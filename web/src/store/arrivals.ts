@@ -13,6 +13,7 @@ export function useTerrain(entry: TerrainDoc): void {
     terrain_id: entry.id,
     orthophoto_id: null,
     seen_id: null,
+    seen_lacks: "",
   }));
   offered.value = null;
 }
