@@ -1,11 +1,14 @@
 import { describe, expect, it } from "vitest";
+import { withUnit } from "../src/format";
 import type { AvoidanceStatus } from "../src/messages";
 import {
   avoidanceWords,
   conflictWhere,
   heightDifference,
+  lateAlert_s,
   isTooFast,
   offNose,
+  seenAgo,
   sensorRow,
   signedHeight,
   spoken,
@@ -123,5 +126,16 @@ describe("avoidance", () => {
       false,
     ]);
     expect(isTooFast({ ...limited, enabled: false }, 9)).toBe(false);
+  });
+});
+
+describe("what is not told again", () => {
+  it("is shown with its age, and nothing is late by a clock that nobody knows", () => {
+    const old = alert("a", { t_mono_s: 100 });
+    expect(lateAlert_s(old, null)).toBeNull();
+    expect(lateAlert_s(old, 101.5)).toBeNull();
+    expect(lateAlert_s(old, 140)).toBe(40);
+    expect(seenAgo(40)).toBe(`${withUnit(40, "s")} ago`);
+    expect(seenAgo(null)).toBe("not now");
   });
 });

@@ -10,7 +10,7 @@ import {
   takeSensing,
   watching,
 } from "../src/store/obstacles";
-import { silence_s, watchOf, withStatus, type Sensed } from "../src/store/sensing";
+import { sightAge_s, silence_s, watchOf, withStatus, type Sensed } from "../src/store/sensing";
 import { alert, alertDoc, obstaclesState, perception, perceptionMessage } from "./obstacle_samples";
 
 beforeEach(() => {
@@ -133,5 +133,23 @@ describe("the mission ahead", () => {
 
   it("is not known to be clear when nothing watches", () => {
     expect(aheadOf([])).toEqual({ conflict: null, corridor_m: 0, isCorridorOccupied: false });
+  });
+});
+
+describe("what a sensor showed last", () => {
+  const told = (state: "running" | "stale" | "blind", at_ms: number, before?: Sensed) =>
+    withStatus(before, perceptionMessage(perception({ state })), at_ms);
+
+  it("is of now while it watches, and as old as its last word that it did", () => {
+    const watches = told("running", 1000);
+    expect(sightAge_s(watches, true, 2000)).toBeNull();
+    expect(sightAge_s(watches, true, 41_000)).toBe(40);
+    const stale = told("stale", 3000, told("stale", 2000, watches));
+    expect(sightAge_s(stale, true, 4000)).toBe(3);
+    expect(sightAge_s(told("running", 5000, stale), true, 5000)).toBeNull();
+  });
+
+  it("has no age where nobody here saw it watch", () => {
+    expect(sightAge_s(told("blind", 1000), true, 9000)).toBeNull();
   });
 });

@@ -6,6 +6,7 @@ import { now_ms } from "../store/clock";
 import { alerts } from "../store/obstacles";
 import { pending } from "../store/outcomes";
 import { failed } from "../store/reach";
+import { serverNow_s } from "../store/server_clock";
 import { isReplaying } from "../store/review";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
@@ -15,7 +16,16 @@ import { Figures, Place, State } from "./AlertFigures";
 import { SensorMark } from "./SensorMark";
 import { ALERTS, acknowledge } from "./obstacle_orders";
 import { hasWays } from "./manoeuvres";
-import { alertSensor, alertTitle, bearingWord, distance, heightDifference, spoken } from "./obstacle_words";
+import {
+  alertSensor,
+  alertTitle,
+  bearingWord,
+  distance,
+  heightDifference,
+  lateAlert_s,
+  seenAgo,
+  spoken,
+} from "./obstacle_words";
 
 /** Further alerts, one line each. */
 const MOST_LINES = 2;
@@ -108,8 +118,13 @@ function Head({ entry, isReplay, onShrink }: HeadProps) {
   );
 }
 
-function Line({ entry }: { entry: AlertDoc }) {
+/** In a recording nothing is late. */
+const late_s = ({ alert, over }: AlertDoc, isReplay: boolean) =>
+  isReplay || over ? null : lateAlert_s(alert, serverNow_s(now_ms.value));
+
+function Line({ entry, isReplay }: { entry: AlertDoc; isReplay: boolean }) {
   const { alert } = entry;
+  const ago_s = late_s(entry, isReplay);
   return (
     <li class={stageOf(entry)} data-testid="alert-line">
       <Icon name="warning" size={16} />
@@ -119,20 +134,21 @@ function Line({ entry }: { entry: AlertDoc }) {
           ? `${distance(alert.obstacle.distance_m)} · ${bearingWord(alert.obstacle)} · ${heightDifference(alert.obstacle.height_difference_m)}`
           : alert.text}
       </span>
-      {entry.acknowledged && <span class="muted">seen</span>}
+      {ago_s !== null && alert.obstacle && <span class="muted">{seenAgo(ago_s)}</span>}
+      {ago_s === null && entry.acknowledged && <span class="muted">seen</span>}
     </li>
   );
 }
 
 /** Those that are there, line by line; of those that are over the button tells how many: the view stays free. */
-function More({ others }: { others: readonly AlertDoc[] }) {
+function More({ others, isReplay }: { others: readonly AlertDoc[]; isReplay: boolean }) {
   const there = others.filter((entry) => !entry.over);
   if (there.length === 0) return null;
   const left = there.length - MOST_LINES;
   return (
     <ul class="alert-more">
       {there.slice(0, MOST_LINES).map((entry) => (
-        <Line key={entry.alert.id} entry={entry} />
+        <Line key={entry.alert.id} entry={entry} isReplay={isReplay} />
       ))}
       {left > 0 && <li class="muted">and {left} more</li>}
     </ul>
@@ -167,7 +183,7 @@ function Banner({ first, others, isReplay, onShrink }: BannerProps) {
     >
       <Head entry={first} isReplay={isReplay} onShrink={onShrink} />
       {alert.obstacle ? (
-        <Figures obstacle={alert.obstacle} isOver={first.over} />
+        <Figures obstacle={alert.obstacle} isOver={first.over} late_s={late_s(first, isReplay)} />
       ) : (
         <p
           class={
@@ -186,7 +202,7 @@ function Banner({ first, others, isReplay, onShrink }: BannerProps) {
         {!isReplay && <Actions first={first} others={others} />}
       </div>
       <ErrorBox place={ALERTS} />
-      <More others={others} />
+      <More others={others} isReplay={isReplay} />
     </section>
   );
 }

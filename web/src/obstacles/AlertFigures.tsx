@@ -3,7 +3,7 @@ import { clock, latLon, metres } from "../format";
 import type { AlertDoc, Obstacle } from "../messages";
 import { notifyText } from "../store/state";
 import { Icon } from "../ui/Icon";
-import { bearingWord, distance, heightDifference, timeTo } from "./obstacle_words";
+import { bearingWord, distance, heightDifference, seenAgo, timeTo } from "./obstacle_words";
 
 /** Where it is; before the first position of the vehicle nobody knows. */
 export function Place({ obstacle: { lat_deg, lon_deg, alt_amsl_m } }: { obstacle: Obstacle }) {
@@ -41,8 +41,21 @@ function Copied({ text, alt_amsl_m }: { text: string; alt_amsl_m: number | null 
   );
 }
 
-/** What is over is told as it was last seen: nobody has to brake for it. */
-export function Figures({ obstacle, isOver }: { obstacle: Obstacle; isOver: boolean }) {
+interface FiguresProps {
+  obstacle: Obstacle;
+  isOver: boolean;
+  /** How old these are; null: they are of now. */
+  late_s: number | null;
+}
+
+function when({ obstacle, isOver, late_s }: FiguresProps): string {
+  if (isOver) return "when last seen";
+  return late_s === null ? timeTo(obstacle.time_to_contact_s) : `seen ${seenAgo(late_s)}`;
+}
+
+/** What is over is told as it was last seen: nobody has to brake for it. What is not told again stays, with its age. */
+export function Figures(props: FiguresProps) {
+  const { obstacle, isOver, late_s } = props;
   return (
     <p class={`alert-figures ${isOver ? "over" : ""}`}>
       <strong class="alert-distance" data-testid="alert-distance">
@@ -50,8 +63,11 @@ export function Figures({ obstacle, isOver }: { obstacle: Obstacle; isOver: bool
       </strong>
       <span>{bearingWord(obstacle)}</span>
       <span>{heightDifference(obstacle.height_difference_m)}</span>
-      <span class={isOver || obstacle.time_to_contact_s === null ? "muted" : ""}>
-        {isOver ? "when last seen" : timeTo(obstacle.time_to_contact_s)}
+      <span
+        class={isOver || (late_s === null && obstacle.time_to_contact_s === null) ? "muted" : ""}
+        data-testid="alert-when"
+      >
+        {when(props)}
       </span>
     </p>
   );

@@ -4,7 +4,7 @@ import { now_ms } from "../store/clock";
 import type { Source } from "../store/flying";
 import { SENSORS, sensed } from "../store/obstacles";
 import { polarRange_m } from "../store/prefs";
-import { watchOf } from "../store/sensing";
+import { sightAge_s, watchOf } from "../store/sensing";
 import { Button } from "../ui/Button";
 import {
   Blips,
@@ -20,7 +20,7 @@ import {
 } from "./PolarLayers";
 import { SensorMark } from "./SensorMark";
 import { nearestOf, nextRange, rings } from "./polar";
-import { SENSOR_WORDS, distance, offNose } from "./obstacle_words";
+import { SENSOR_WORDS, distance, offNose, seenAgo } from "./obstacle_words";
 
 function words(all: readonly Shown[]): string {
   const watching = all.filter((shown) => shown.isWatching);
@@ -69,9 +69,10 @@ function Zoom({ range_m }: { range_m: number }) {
 function Keys({ all }: { all: readonly Shown[] }) {
   return (
     <ul class="polar-keys">
-      {all.map(({ sensor, isWatching }) => (
-        <li key={sensor} class={isWatching ? "" : "off"}>
-          <SensorMark sensor={sensor} /> {SENSOR_WORDS[sensor]}
+      {all.map(({ sensor, isWatching, ago_s }) => (
+        <li key={sensor}>
+          <SensorMark sensor={sensor} /> <span class={isWatching ? "" : "off"}>{SENSOR_WORDS[sensor]}</span>
+          {!isWatching && <span data-testid={`seen-ago-${sensor}`}>{seenAgo(ago_s)}</span>}
         </li>
       ))}
     </ul>
@@ -92,7 +93,8 @@ export function Polar({ source, state }: DisplayProps) {
     const entry = known.get(sensor);
     if (!entry) return [];
     const watch = watchOf(entry, source === "live", now_ms.value);
-    return [{ sensor, sensed: entry, isWatching: watch === "running" }];
+    const ago_s = sightAge_s(entry, source === "live", now_ms.value);
+    return [{ sensor, sensed: entry, isWatching: watch === "running", ago_s }];
   });
   const blind = all.every((shown) => !shown.isWatching);
   return (
@@ -117,7 +119,7 @@ export function Polar({ source, state }: DisplayProps) {
           <Blips key={shown.sensor} shown={shown} range_m={range_m} />
         ))}
         <OwnShip />
-        <Heights all={all} range_m={range_m} />
+        <Heights all={all.filter((shown) => shown.isWatching)} range_m={range_m} />
         {blind && (
           <text class="polar-blind" y={42}>
             NOT WATCHED

@@ -17,6 +17,8 @@ export interface Shown {
   sensed: Sensed;
   /** What it says is true now: its regions and marks are drawn firmly. */
   isWatching: boolean;
+  /** How old what it shows is; null: it watches, or nobody knows. */
+  ago_s: number | null;
 }
 
 /** Rings around own ship; the last value is the rim's, every second one is written. */
@@ -64,7 +66,7 @@ export function Sector({ shown, range_m }: { shown: Shown; range_m: number }) {
 
 export function Sweep({ shown, range_m }: { shown: Shown; range_m: number }) {
   return (
-    <g class={`polar-sweep sensor-${shown.sensor}`}>
+    <g class={`polar-sweep sensor-${shown.sensor} ${shown.isWatching ? "" : "old"}`}>
       {sweepArcs(shown.sensed.status.sweep_m, range_m).map((arc) => (
         <path key={arc.path} d={arc.path} />
       ))}
@@ -75,7 +77,7 @@ export function Sweep({ shown, range_m }: { shown: Shown; range_m: number }) {
 export function Blips({ shown, range_m }: { shown: Shown; range_m: number }) {
   const all = blips(shown.sensed.status, range_m);
   return (
-    <g class={`polar-blips sensor-${shown.sensor}`}>
+    <g class={`polar-blips sensor-${shown.sensor} ${shown.isWatching ? "" : "old"}`}>
       {all.map((blip, index) => (
         <g key={index} transform={`translate(${blip.x.toFixed(1)} ${blip.y.toFixed(1)})`}>
           <path d={SHAPES[shown.sensor]} />

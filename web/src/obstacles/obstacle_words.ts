@@ -1,7 +1,7 @@
-import { DASH, bearing, metres, number, withUnit } from "../format";
+import { DASH, bearing, duration, metres, number, withUnit } from "../format";
 import type { AlertDoc, AvoidanceStatus, MissionConflict, Obstacle, ObstacleAlert } from "../messages";
 import type { SensorName } from "../store/obstacles";
-import type { Sensed, Watch } from "../store/sensing";
+import { SILENT_S, type Sensed, type Watch } from "../store/sensing";
 
 /** Obstacles, sensors and avoidance in a few words. */
 
@@ -46,6 +46,17 @@ export function signedHeight(value_m: number): string {
 
 export const timeTo = (value_s: number | null) =>
   value_s === null ? "not getting nearer" : `contact in ${withUnit(value_s, "s", value_s < 10 ? 1 : 0)}`;
+
+const ageWords = (ago_s: number) => (ago_s < 100 ? withUnit(Math.floor(ago_s), "s") : duration(ago_s));
+
+/** Of what is shown and is not of now. */
+export const seenAgo = (ago_s: number | null) => (ago_s === null ? "not now" : `${ageWords(ago_s)} ago`);
+
+/** What is told again every second and was not is no distance of now: how long ago, null where it is of now. */
+export function lateAlert_s(alert: ObstacleAlert, now_s: number | null): number | null {
+  const ago_s = now_s === null ? 0 : now_s - alert.t_mono_s;
+  return ago_s > SILENT_S ? ago_s : null;
+}
 
 /** Whose alert it is; avoidance, which several sensors serve, is nobody's, and traffic tells of itself. */
 export const alertSensor = ({ sensor, kind }: ObstacleAlert): SensorName | null =>

@@ -6,6 +6,8 @@ export interface Sensed {
   now_mono_s: number;
   received_ms: number;
   rate_hz: number | null;
+  /** When it said last that it watches, by this page's clock; null: not since this page looks. */
+  watched_ms: number | null;
   marks: readonly Mark[];
 }
 
@@ -39,7 +41,8 @@ export function withStatus(
 ): Sensed {
   const { status, now_mono_s } = message;
   const marks = marksWith(before?.marks ?? [], { t_mono_s: status.t_mono_s, frames: status.frames });
-  return { status, now_mono_s, received_ms, rate_hz: rateOf(marks), marks };
+  const watched_ms = status.state === "running" ? received_ms : (before?.watched_ms ?? null);
+  return { status, now_mono_s, received_ms, rate_hz: rateOf(marks), watched_ms, marks };
 }
 
 /** A node says something every second; after this it is silent. */
@@ -56,3 +59,10 @@ export type Watch = PerceptionStatus["state"] | "silent";
 /** What may be relied on: a node that has fallen silent is not "running", whatever it said last. */
 export const watchOf = (sensed: Sensed, isLive: boolean, now_ms: number): Watch =>
   silence_s(sensed, isLive, now_ms) === null ? sensed.status.state : "silent";
+
+/** Seconds since a sensor that does not watch now did so last: so old is what is shown of it. Null: it watches, or
+ * nobody here knows. */
+export function sightAge_s(sensed: Sensed, isLive: boolean, now_ms: number): number | null {
+  if (watchOf(sensed, isLive, now_ms) === "running" || sensed.watched_ms === null) return null;
+  return Math.max(0, now_ms - sensed.watched_ms) / 1000;
+}
