@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from functools import partial
 
 import pytest
 from playwright.sync_api import Page, WebSocketRoute, expect
@@ -45,21 +46,41 @@ def test_one_press_shows_another_vehicle_and_moves_nobody_s_charge(pair: Station
     expect(page.get_by_test_id("vehicle-1")).to_have_attribute("aria-pressed", "true")
 
 
+def test_many_vehicles_have_whole_names_on_a_phone(pair: Station, page: Page) -> None:
+    longest = "Mapper of the north field"[:24]
+    lost = VehicleAlarm(kind="loss", key="lost", text="Nothing is heard of it any more.")
+    vehicles = [VehicleDoc(number=n, name=longest if n % 2 else f"Vehicle {n}", alarm=lost) for n in range(1, 9)]
+    page.route_web_socket(STREAM, partial(_with_fleet, vehicles))
+    page.set_viewport_size({"width": 390, "height": 800})
+    enter(page, pair)
+    expect(page.get_by_test_id("vehicle-8")).to_contain_text("Vehicle 8", timeout=LONG_MS)
+    is_cut = "e.scrollWidth > e.clientWidth || e.scrollHeight > e.clientHeight + 1"
+    find = f"all => all.filter(e => {is_cut}).map(e => e.innerText)"
+    cut = page.eval_on_selector_all(".fleet-vehicle, .fleet-vehicle > strong", find)
+    assert cut == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    rows = page.locator(".fleet-vehicles").bounding_box()
+    assert rows is not None
+    said = page.evaluate("getComputedStyle(document.documentElement).getPropertyValue('--fleet-height')")
+    assert said == f"{rows['height']:.0f}px", "what is said of the safety buttons covers none of them"
+
+
+def _with_fleet(vehicles: list[VehicleDoc], route: WebSocketRoute) -> None:
+    """The station's own words, but of these vehicles."""
+    server = route.connect_to_server()
+
+    def to_page(text: str | bytes) -> None:
+        told = json.loads(text)
+        route.send(FleetMessage(vehicles=vehicles).model_dump_json() if told["type"] == "fleet" else text)
+
+    server.on_message(to_page)
+
+
 @pytest.mark.parametrize("width", [390, 1366])
 def test_an_alarm_of_another_vehicle_is_read_and_answered_at_any_width(pair: Station, page: Page, width: int) -> None:
     lost = VehicleAlarm(kind="loss", key="lost", text="Nothing is heard of it any more. Take the pilot's transmitter.")
     vehicles = [VehicleDoc(number=1, name="Bee"), VehicleDoc(number=2, name="Wasp", armed=True, alarm=lost)]
-
-    def pass_on(route: WebSocketRoute) -> None:
-        server = route.connect_to_server()
-
-        def to_page(text: str | bytes) -> None:
-            told = json.loads(text)
-            route.send(FleetMessage(vehicles=vehicles).model_dump_json() if told["type"] == "fleet" else text)
-
-        server.on_message(to_page)
-
-    page.route_web_socket(STREAM, pass_on)
+    page.route_web_socket(STREAM, partial(_with_fleet, vehicles))
     page.set_viewport_size({"width": width, "height": 800})
     enter(page, pair)
     alarm = page.get_by_test_id("fleet-alarm")

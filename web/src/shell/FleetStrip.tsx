@@ -1,3 +1,4 @@
+import { useLayoutEffect, useRef } from "preact/hooks";
 import { duration, number, withUnit } from "../format";
 import type { VehicleDoc } from "../messages";
 import { acknowledgeElsewhere, active, calling, fleet } from "../store/fleet";
@@ -77,16 +78,33 @@ function Elsewhere() {
   );
 }
 
+/** However many rows they need: what is said of the safety buttons stands below the last one. */
+function tellHeight(rows: HTMLElement) {
+  const observer = new ResizeObserver(() =>
+    document.documentElement.style.setProperty("--fleet-height", `${rows.offsetHeight}px`),
+  );
+  observer.observe(rows);
+  return () => observer.disconnect();
+}
+
+function Rows() {
+  const rows = useRef<HTMLDivElement>(null);
+  useLayoutEffect(() => (rows.current ? tellHeight(rows.current) : undefined), []);
+  return (
+    <div class="fleet-vehicles" ref={rows}>
+      {fleet.value.map((vehicle) => (
+        <Vehicle key={vehicle.number} vehicle={vehicle} />
+      ))}
+    </div>
+  );
+}
+
 /** All vehicles, where there are several: which one is shown, and one press to show another. */
 export function FleetStrip() {
   if (fleet.value.length < 2) return null;
   return (
     <nav class="fleet" aria-label="Vehicles" data-testid="fleet">
-      <div class="fleet-vehicles">
-        {fleet.value.map((vehicle) => (
-          <Vehicle key={vehicle.number} vehicle={vehicle} />
-        ))}
-      </div>
+      <Rows />
       <Elsewhere />
     </nav>
   );
