@@ -68,6 +68,17 @@ def test_a_plan_with_a_ceiling_alone_is_flown_within_the_vehicles_shapes_as_well
     assert within[1] == RALLY
 
 
+def test_a_floor_or_ceiling_is_never_said_to_be_on_board() -> None:
+    heights = replace(NO_FENCE, floor_rel_home_m=5.0, ceiling_rel_home_m=60.0)
+    row = judged(PlacesOnboard(), planned=(heights, ()))
+    assert row.text.startswith("Not on board, by no list: floor at 5 m above home, ceiling at 60 m above home.")
+    assert "FENCE_ALT_MAX" in row.mend
+    both = judged(aboard())
+    assert "on board, the plan's; the flight is held against it. Not on board, by no list: ceiling at 80 m" in both.text
+    shapes = replace(FENCE, ceiling_rel_home_m=None)
+    assert "Not on board" not in judged(aboard(), planned=(shapes, RALLY)).text
+
+
 def test_nothing_anywhere_is_no_row() -> None:
     assert fence_row((NO_FENCE, ()), PlacesOnboard(), ACTS, "ardupilot") is None
 

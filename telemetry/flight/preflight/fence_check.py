@@ -78,16 +78,30 @@ def fence_row(
             return Row("fence", "bad", f"The {what} on board is not the plan's.", "Upload the plan again.")
     if not wanted and not any(held):
         return None
+    if not any(held):
+        return Row("fence", "good", _heights(planned[0]), _HEIGHTS_MEND[firmware])
     whose = "the plan's" if wanted else "another than the plan's, which has none"
     if wanted and strange:
         whose = f"but {' and '.join(strange)} not the plan's"
-    text = f"{fence_words(*held)} on board, {whose}; the flight is held against it."
+    text = f"{fence_words(*held)} on board, {whose}; the flight is held against it. {_heights(planned[0])}".strip()
     deaf = _deaf(held[0], parameters, firmware)
     if deaf:
         return Row("fence", "accept", f"{text} {deaf}", "Set it under Parameters, or accept it.")
     return Row("fence", "good", f"{text} {at_fence(parameters, firmware)}".strip(), _CLEAR if strange else "")
 
 
+def _heights(planned: Fence) -> str:
+    """Of a plan's floor and ceiling, which no list holds; empty where it has none."""
+    if not planned.has_heights:
+        return ""
+    words = fence_words(Fence((), (), planned.floor_rel_home_m, planned.ceiling_rel_home_m), ()).removeprefix("Fence: ")
+    return f"Not on board, by no list: {words}. The flight is held against it, the vehicle knows nothing of it."
+
+
+_HEIGHTS_MEND: dict[Firmware, str] = {
+    "ardupilot": "The vehicle keeps heights of its own: FENCE_ALT_MIN, FENCE_ALT_MAX and FENCE_TYPE.",
+    "px4": "The vehicle keeps a height of its own: GF_MAX_VER_DIST.",
+}
 _CLEAR = "To remove it, use: hedgehop fence LINK clear, hedgehop rally LINK clear."
 
 
