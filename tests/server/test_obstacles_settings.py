@@ -73,7 +73,7 @@ def test_map_and_vehicle_are_published_and_kept(desk: Desk) -> None:
     ("fields", "where", "what", "advice"),
     [
         ({"vision_resolution_m": 0.05}, "vision map", "One look out to 40 m", "0.06 m or coarser"),
-        ({"vision_resolution_m": 0.25, "memory_limit_bytes": GB // 100}, "vision map", "10 MB", "0.324 m or coarser"),
+        ({"vision_resolution_m": 0.25, "memory_limit_bytes": GB // 100}, "vision map", "10 MB", "0.276 m or coarser"),
         ({"memory_limit_bytes": 3 * GB}, "memory", "12,000 MB; this computer has 8,000 MB", "2,000 MB"),
         ({"radar_resolution_m": 0.2}, "radar map", "A corridor 120 m long and 1.6 m wide at 0.2 m", "m or coarser"),
         ({"vision_depth_m": 40, "fov_deg": 120, "height_m": 20, "vision_resolution_m": 0.18}, "vision map",
@@ -95,7 +95,7 @@ def test_what_cannot_fit_is_refused_with_the_number_and_nothing_changes(
 
 def test_what_would_do_does(desk: Desk) -> None:
     desk.change(memory_limit_bytes=2_000_000_000)
-    desk.change(vision_resolution_m=0.324)
+    desk.change(vision_resolution_m=0.276)
     desk.change(memory_limit_bytes=GB // 100)
     assert desk.published[-1].memory_limit_bytes == GB // 100
 
