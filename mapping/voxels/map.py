@@ -53,7 +53,8 @@ class VoxelMap:
     updated. With ``reach_m`` a resolution at which a quarter of the ball of that radius (what a wide camera sees at
     once) does not fit is refused with CapacityError, which names the resolution that does.
 
-    Lookups may run in another thread while a scan is put in; changing the map takes one thread at a time.
+    Lookups may run in another thread while a scan is put in; changing the map takes one thread at a time, and
+    ``changed_since`` counts as changing it.
     """
 
     def __init__(

@@ -48,8 +48,9 @@ class Store(NamedTuple):
     """Arrays of one map, made once for all blocks it may ever hold: the system gives memory only as they fill.
 
     Nothing that is found is ever moved, so that another thread may look things up while a scan is put in. Voxels share
-    their log-odds: there are few different ones, since hits and misses come in two sizes and end at the clamps, so that
-    a cell needs two bytes for exactly what OctoMap keeps in four.
+    their log-odds: hits and misses come in two sizes and end at the clamps, so that there are few different ones, and a
+    cell needs two bytes for exactly what OctoMap keeps in four. Where more than 8,191 come up (not within an hour of
+    scans by chance at 10 Hz), the next higher one of these stands for a new one.
     """
 
     table: I32

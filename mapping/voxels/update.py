@@ -48,7 +48,7 @@ class Model(NamedTuple):
 def number_of(store, model, log_odds):
     """Of these log-odds among the map's values. A map that has all it can tell apart takes the next higher ones."""
     counts = store.counts
-    higher = 0
+    higher = 0  # the clamps came first: between them one is always there
     for n in range(1, counts[N_VALUES]):
         value = store.values[n]
         if value == log_odds:
@@ -65,8 +65,19 @@ def number_of(store, model, log_odds):
 
 
 @njit(cache=True, nogil=True)
+def _next_lower(store, number):
+    """For a miss smaller than what a full map can tell apart: it frees all the same."""
+    lower = 0
+    for n in range(1, store.counts[N_VALUES]):
+        value = store.values[n]
+        if value < store.values[number] and (lower == 0 or value > store.values[lower]):
+            lower = n
+    return lower
+
+
+@njit(cache=True, nogil=True)
 def begin_values(store, model):
-    """The clamps come first: between them a next higher value is always there."""
+    """The clamps are a map's first values."""
     number_of(store, model, model.highest)
     number_of(store, model, model.lowest)
 
@@ -114,6 +125,8 @@ def apply_mark(store, model, block, voxel, mark):
         after = np.int64(store.after_miss[number])
         if after == 0:
             after = number_of(store, model, max(store.values[number] + model.miss, model.lowest))
+            if after == number and store.values[number] > model.lowest:
+                after = _next_lower(store, number)
             store.after_miss[number] = after
         put(store, block, voxel, after | truths)
 

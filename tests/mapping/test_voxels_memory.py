@@ -37,19 +37,23 @@ def test_another_thread_finds_what_was_there_while_the_table_grows(monkeypatch: 
     voxels = VoxelMap(resolution_m=1.0, memory_limit_bytes=40_000_000)
     first = np.array([[0.5, 0.5, 0.5], [100.5, 0.5, 0.5]])
     voxels.insert_hits(first)
-    missed, ends = [], threading.Event()
+    missed, looked, ends = [], threading.Event(), threading.Event()
 
     def look() -> None:
         while not ends.is_set():
             missed.extend(np.flatnonzero(~(voxels.probability(first) >= 0.7)))
+            looked.set()
 
     reader = threading.Thread(target=look)
     reader.start()
     rng = np.random.default_rng(5)
-    for _ in range(40):
-        voxels.insert_hits(rng.uniform(-2_000.0, 2_000.0, (250, 3)))
-    ends.set()
-    reader.join()
+    try:
+        assert looked.wait(60.0)
+        for _ in range(40):
+            voxels.insert_hits(rng.uniform(-2_000.0, 2_000.0, (250, 3)))
+    finally:
+        ends.set()
+        reader.join()
     assert missed == []
     assert voxels.blocks.counts[store.TABLE_FIRST] >= 16_384
 
@@ -71,6 +75,23 @@ def test_a_map_that_has_all_the_values_it_can_tell_apart_takes_the_next_higher_o
     more = np.array([rounded[key][0] - exact[key][0] for key in exact])
     assert more.min() >= -1e-6
     assert 0.0 < more.max() < 0.01
+
+
+def test_misses_free_a_voxel_also_where_a_full_map_cannot_tell_them_apart() -> None:
+    voxels = small_map(prob_miss=0.4999)
+    values, counts = voxels.blocks.values, voxels.blocks.counts
+    values[counts[store.N_VALUES] :] = np.linspace(-1.9, 3.4, store.VALUE + 1 - counts[store.N_VALUES])
+    voxels.blocks.kinds[counts[store.N_VALUES] :] = np.where(
+        values[counts[store.N_VALUES] :] > 0.0, store.KNOWN | store.OCCUPIED, store.KNOWN
+    )
+    counts[store.N_VALUES] = store.VALUE + 1
+    hit, beyond = [[2.25, 0.25, 0.25]], [[4.25, 0.25, 0.25]]
+    voxels.insert_hits(hit)
+    before = voxels.probability(hit)[0]
+    for _ in range(3_000):
+        voxels.insert(beyond, origin_enu=(0.25, 0.25, 0.25), max_range_m=10.0)
+    assert before == pytest.approx(0.7, abs=0.01)
+    assert voxels.probability(hit)[0] < 0.5
 
 
 def test_what_a_camera_sees_costs_at_most_eight_bytes_a_voxel() -> None:
