@@ -13,6 +13,7 @@ import pytest
 from server.app import origin_file
 from server.cli.flights import station_session
 from server.cli.flights.station_session import StationSession
+from server.door import lease
 from server.errors import CheckNeededError, StationError
 from server.schemas import HomeAskedDoc, HomeState, LeaseDoc, ReasonDoc, ReturnDoc
 from tests.free_ports import free_port
@@ -119,6 +120,7 @@ def test_what_the_station_refuses_ends_the_command_in_its_words(served: Running,
     assert run.code == 1
     assert run.json["error"]["code"] == "check_needed"
     assert run.json["error"]["what"] == "Sensors have seen more near the return."
+    assert desk.asked == [("judge", None), ("set", "judged"), ("drop",)]
     assert in_charge(served) is None
 
 
@@ -127,6 +129,7 @@ def test_who_is_in_charge_is_asked(
     served: Running, desk: Desk, answer: str, code: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(station_session, "LOOK_EVERY_S", 0.05)
+    monkeypatch.setattr(lease, "SILENT_S", 600.0)  # who is in charge has no page here
     served.http.post("/api/lease/take")
     answering = threading.Thread(target=lambda: answered(served, answer))
     answering.start()
@@ -143,7 +146,9 @@ def test_who_is_in_charge_is_asked(
 
 def answered(served: Running, answer: str) -> None:
     asks = threading.Event()
-    while not asks.wait(0.02):
+    for _ in range(1_000):
+        if asks.wait(0.02):
+            break
         if served.http.get("/api/lease").json()["asks"]:
             asks.set()
     served.http.post(f"/api/lease/{answer}")

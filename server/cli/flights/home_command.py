@@ -43,13 +43,16 @@ def home(
     body = {"place": None if where is None else {"lat_deg": where[0], "lon_deg": where[1]}}
     with station_session(data_dir, vehicle) as station:
         station.take_control()
-        asked = _judged(station, body)
-        refusal = _why_not(asked.ret, accepts=accept_return)
-        is_set = not check and refusal is None
-        if is_set:
-            _set(station, asked)
-        else:
-            station.ask("DELETE", "/api/flight/home", doing="Putting away what was judged")
+        is_set = False
+        try:
+            asked = _judged(station, body)
+            refusal = _why_not(asked.ret, accepts=accept_return)
+            if not check and refusal is None:
+                _set(station, asked)
+                is_set = True
+        finally:
+            if not is_set:
+                _put_away(station)
     if refusal is not None and not check:
         say_notes(refusal)
     answer({"set": is_set, **_summary(asked)}, _lines(asked, is_set=is_set), as_json=as_json)
@@ -70,6 +73,14 @@ def _set(station: StationSession, asked: HomeAskedDoc) -> None:
     progress("Setting home", None)
     station.ask("POST", "/api/flight/home/set", {"id": asked.id}, within_s=SET_WITHIN_S, doing="Setting home")
     end_progress()
+
+
+def _put_away(station: StationSession) -> None:
+    """Or somebody else sets what nobody wants any more. That it fails is said, and hides no other error."""
+    try:
+        station.ask("DELETE", "/api/flight/home", doing="Putting away what was judged")
+    except StationError as error:
+        say_notes(f"what was judged may still stand in the console: {error.what}")
 
 
 def _why_not(ret: ReturnDoc | None, *, accepts: bool) -> str | None:
