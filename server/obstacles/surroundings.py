@@ -27,6 +27,7 @@ from telemetry.flight.home_watch import home_of_takeoff
 from telemetry.topics.deltas import packed_keys
 from telemetry.topics.obstacles import SENSORS, ObstacleAlert, Sensor
 
+COLUMN_M = 1.0
 SAME_M = 1.5
 """What is seen so near to what was seen before is the same thing: positions wander, and frames differ."""
 COMES_WITHIN_S, LOOK_S = 10.0, 0.02
@@ -117,7 +118,7 @@ def is_more_seen_near(
         fresh = ~_are_among(numbers, np.concatenate([np.zeros(0, np.int64), *known]))
         # Few of many: a line with many returns from it is long.
         centres = map_.centres_enu_m[~map_.explained][fresh]
-        near = _is_near(centres[:, :2], line_m, within_m + map_.resolution_m)
+        near = _are_near(centres[:, :2], line_m, within_m + map_.resolution_m)
         if near.any() and not _are_beside(centres[near], _seen_enu_m(before, frame)):
             return True
     return False
@@ -188,6 +189,14 @@ def _are_among(numbers: I64, known: I64) -> Bools:
     among = at < len(known)
     among[among] = known[at[among]] == numbers[among]
     return among
+
+
+def _are_near(points_m: F64, line_m: F64, within_m: float) -> Bools:
+    """As ``_is_near``, up to half the diagonal of a column of ``COLUMN_M`` farther: for many, over each other."""
+    places = np.floor(points_m / COLUMN_M).astype(np.int32)
+    _, first, column = np.unique(packed_keys(np.pad(places, ((0, 0), (0, 1)))), return_index=True, return_inverse=True)
+    middles_m = (places[first].astype(np.float64) + 0.5) * COLUMN_M
+    return _is_near(middles_m, line_m, within_m + COLUMN_M * math.sqrt(0.5))[column]
 
 
 def _is_near(points_m: F64, line_m: F64, within_m: float) -> Bools:

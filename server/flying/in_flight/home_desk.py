@@ -302,9 +302,9 @@ class HomeDesk:
         self._gathered = asked = await self._ways.renewed(asked)
         began_s = time.monotonic()
         doc, led = await self._lane.call(judge_return, asked)
-        self._took_s = time.monotonic() - began_s
         if (home := home_of(asked.state)) is not None:
             doc = await self._noted(doc, led, (home.lat_deg, home.lon_deg), asked)
+        self._took_s = time.monotonic() - began_s
         if self._gathered is asked:
             return doc
         return _unknown("What the vehicle holds was changed meanwhile.", "It is being judged anew.")
