@@ -59,10 +59,12 @@ def test_many_vehicles_have_whole_names_on_a_phone(pair: Station, page: Page) ->
     cut = page.eval_on_selector_all(".fleet-vehicle, .fleet-vehicle > strong", find)
     assert cut == []
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
-    rows = page.locator(".fleet-vehicles").bounding_box()
-    assert rows is not None
-    said = page.evaluate("getComputedStyle(document.documentElement).getPropertyValue('--fleet-height')")
-    assert said == f"{rows['height']:.0f}px", "what is said of the safety buttons covers none of them"
+    # What is said of the safety buttons covers none of them.
+    page.wait_for_function(
+        "getComputedStyle(document.documentElement).getPropertyValue('--fleet-height') ==="
+        " document.querySelector('.fleet-vehicles').offsetHeight + 'px'",
+        timeout=LONG_MS,
+    )
 
 
 def _with_fleet(vehicles: list[VehicleDoc], route: WebSocketRoute) -> None:
