@@ -70,7 +70,10 @@ class LiveTransforms:
         return sorted(self._links.keys() | {link.parent for link in self._links.values()})
 
     def add(self, parent: str, child: str, stamp_ns: int, xyz_m: F64, q_wxyz: F64, *, is_static: bool) -> None:
-        """Raises FrameError for a second parent, a circle, or too many frames."""
+        """Raises FrameError for a second parent, a circle, too many frames, or one that is fixed and is to move.
+
+        What is fixed stays fixed, whichever was told first: a single odd transform must not unmount a sensor for good.
+        """
         link = self._links.get(child)
         if link is None:
             if len(self._links) >= MOST_NAMES or max(len(parent), len(child)) > LONGEST_NAME:
@@ -80,6 +83,8 @@ class LiveTransforms:
             link = self._links[child] = _Link(parent, is_static)
         if link.parent != parent:
             raise FrameError(f"the frame {child} has two parents, {link.parent} and {parent}")
+        if link.is_static and not is_static:
+            raise FrameError(f"the frame {child} is fixed by /tf_static, and moved by /tf")
         link.is_static = is_static
         link.take((stamp_ns, xyz_m, q_wxyz))
 

@@ -235,6 +235,13 @@ def test_ways_between_frames_of_now() -> None:
     for parent, child, why in (("lidar", "mast", "two parents"), ("lidar", "odom", "circle"), ("x", "x", "circle")):
         with pytest.raises(FrameError, match=why):
             tree.add(parent, child, 0, *NOTHING, is_static=True)
+    # What is fixed stays fixed, and what moves may turn out to be fixed.
+    with pytest.raises(FrameError, match="fixed by /tf_static"):
+        tree.add("mast", "lidar", 25 * 10**9, *NOTHING, is_static=False)
+    tree.add("odom", "base", 0, np.array([7.0, 0.0, 0.0]), NOTHING[1], is_static=True)
+    way = tree.at("odom", "lidar", 99 * 10**9, 10**8)
+    assert isinstance(way, Transform)
+    assert way(np.zeros((1, 3))) == pytest.approx(np.array([[8.0, 0.0, 1.0]]))
 
 
 def test_who_is_slow_loses_the_oldest_and_nobody_waits() -> None:
