@@ -485,15 +485,20 @@ def test_what_was_waited_for_is_no_time_of_the_worker(
             now_s[0] += 9.0
             return asked
 
-        async def call(*_: object) -> ReturnDoc:
+        async def call(*_: object) -> tuple[ReturnDoc, None]:
             now_s[0] += 2.0
-            return ReturnDoc(state="certified", reasons=[], judged_mono_s=now_s[0])
+            return ReturnDoc(state="certified", reasons=[], judged_mono_s=now_s[0]), None
+
+        async def noted(ret: ReturnDoc, *_: object) -> ReturnDoc:
+            now_s[0] += 1.0  # looking along it is work, too
+            return ret
 
         monkeypatch.setattr(bench.desk._ways, "renewed", renewed)
         monkeypatch.setattr(bench.desk, "_lane", SimpleNamespace(call=call))
+        monkeypatch.setattr(bench.desk, "_noted", noted)
         await bench.desk._judge_return()
         assert bench.desk._judged is not None
-        assert bench.desk._judged.took_s == pytest.approx(2.0)
+        assert bench.desk._judged.took_s == pytest.approx(3.0)
 
     runner.run(scenario())
 
