@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Sequence
-from typing import Literal
 
 import pytest
 from playwright.sync_api import FloatRect, Page, Route, WebSocketRoute, expect
@@ -17,6 +16,8 @@ from server.schemas import (
     HomeAskedDoc,
     HomeMessage,
     HomeState,
+    LeaseDoc,
+    LeaseMessage,
     LinkMessage,
     MeMessage,
     NodesMessage,
@@ -181,7 +182,7 @@ LOST = (
         follow=None,
         state=VehicleState(1, 1, armed=True, mode="GUIDED", heartbeat_t_mono_s=10.0, battery_share=0.97),
     ),
-    RecorderMessage(recorder=RecorderStatus(10.0, True, "flight.mcap", started_utc_s=1000.0, bytes=40_000_000)),
+    RecorderMessage(recorder=RecorderStatus(10.0, True, "flight.mcap", started_utc_s=time.time() - 754.0, bytes=40_000_000)),
     TextMessage(source="live", text=VehicleText(1000.0, 1, "The link has restarted: nothing avoided meanwhile.")),
     NodesMessage(
         nodes=[
@@ -192,13 +193,23 @@ LOST = (
 )
 
 
-@pytest.mark.parametrize("role", ["operator", "observer"])
+WHO: dict[str, tuple[MeMessage | LeaseMessage, ...]] = {
+    name: (MeMessage(me=MeDoc(name="Ann", role=role, owner=False)), LeaseMessage(lease=lease))
+    for name, role, lease in (
+        ("in-charge", "operator", LeaseDoc(holder="Ann", mine=True, silent=False)),
+        ("looking-on", "operator", LeaseDoc(holder="Owner ad42", mine=False, silent=True)),
+        ("nobody-in-charge", "operator", LeaseDoc(holder=None, mine=False, silent=False)),
+        ("observer", "observer", LeaseDoc(holder="Owner ad42", mine=False, silent=False)),
+    )
+}
+
+
+@pytest.mark.parametrize("who", WHO)
 @pytest.mark.parametrize("is_server_lost", [False, True], ids=["link", "server"])
 def test_while_something_has_failed_the_bars_stay_readable_at_every_width(
-    station: Station, page: Page, *, is_server_lost: bool, role: Literal["operator", "observer"]
+    station: Station, page: Page, *, is_server_lost: bool, who: str
 ) -> None:
-    me = MeMessage(me=MeDoc(name="Ann", role=role, owner=False))
-    sides = _with_messages(page, (*LOST, me))
+    sides = _with_messages(page, (*LOST, *WHO[who]))
     visit(page, station)
     page.get_by_test_id("tab-fly").click()
     expect(page.get_by_test_id("chip-link")).to_contain_text("Link failed")
@@ -217,6 +228,30 @@ def test_while_something_has_failed_the_bars_stay_readable_at_every_width(
     assert found == {}
 
 
+@pytest.mark.parametrize("who", WHO)
+def test_an_alert_and_who_is_in_charge_cut_no_figure_off(
+    station: Station, page: Page, who: str
+) -> None:
+    flies = VehicleMessage(
+        source="live",
+        now_mono_s=10.0,
+        follow=None,
+        state=VehicleState(1, 1, armed=True, mode="BRAKE", heartbeat_t_mono_s=10.0, battery_share=0.87),
+    )
+    _with_messages(page, (*AHEAD, flies, *LOST[2:4], *WHO[who]))
+    visit(page, station)
+    page.get_by_test_id("tab-fly").click()
+    expect(page.get_by_test_id("chip-battery")).to_contain_text("87")
+    found = {}
+    for width in (1440, 1180, 1024, 820, 390):
+        page.set_viewport_size({"width": width, "height": 844})
+        expect(page.get_by_test_id("chip-alert")).to_be_visible()
+        expect(page.get_by_test_id("take-control")).to_have_count(0 if who in {"in-charge", "observer"} else 1)
+        if collisions := page.locator(".vehicle-strip").evaluate(COLLISIONS):
+            found[width] = collisions
+    assert found == {}
+
+
 COLLISIONS = """(bar) => {
   const sides = bar.getBoundingClientRect();
   const isSeen = (part) => part.getClientRects().length > 0 && getComputedStyle(part).clipPath === "none";
@@ -227,6 +262,8 @@ COLLISIONS = """(bar) => {
     .filter(({ box }) => box.width > 1 && box.height > 1);
   const out = parts.filter(({ box }) => box.right > sides.right + 1 || box.left < sides.left - 1);
   const found = out.map(({ is, box }) => `${is} sticks out, to ${box.right}`);
+  const cut = parts.filter(({ box }) => box.bottom > sides.bottom + 1 || box.top < sides.top - 1);
+  found.push(...cut.map(({ is, box }) => `${is} is cut off, from ${box.top} to ${box.bottom}`));
   for (const [i, one] of parts.entries())
     for (const two of parts.slice(i + 1)) {
       if (one.part.contains(two.part) || two.part.contains(one.part)) continue;

@@ -252,7 +252,7 @@ function Operator() {
         : "Nobody in charge";
   const title = holder ? `${holder} is in charge` : "Nobody is in charge";
   return (
-    <div class="operator">
+    <div class={mine ? "operator" : "operator looks-on"}>
       <Chip
         icon={mine ? "user" : "eye"}
         text={text}
