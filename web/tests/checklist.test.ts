@@ -17,6 +17,7 @@ import {
   WRITING,
 } from "../src/store/checklist";
 import { fly } from "../src/store/flying";
+import { pending } from "../src/store/outcomes";
 import { errors } from "../src/store/state";
 import { facts, flyState } from "./flight_samples";
 
@@ -98,6 +99,35 @@ describe("a tick", () => {
     expect(JSON.parse(String(init?.body))).toEqual({ digest: "d", revision: "r", number: 2, ticked: true });
     expect(isTicked(doc, 2)).toBe(false);
     expect(errors.value[CHECKLIST]?.what).toBe("The list was changed.");
+  });
+
+  it("stands until the list shows it, which the answer may overtake", async () => {
+    answering(() => json({}));
+    const doc = list();
+    const sent = tickPoint(doc, 2, true);
+    await vi.waitFor(() => expect(pending.value.has(CHECKLIST)).toBe(false));
+    expect(isTicked(doc, 2)).toBe(true);
+    const ticked = list({
+      points: [doc.points[0]!, point("Battery", "Vehicle", "Anna"), doc.points[2]!],
+    });
+    fly.value = flyState({ ...fly.value!, checklist: ticked });
+    await sent;
+    expect(isTicked(ticked, 2)).toBe(true);
+    // What somebody else takes back from then on is seen at once.
+    expect(isTicked(doc, 2)).toBe(false);
+  });
+
+  it("is taken back when no list ever shows it", async () => {
+    vi.useFakeTimers();
+    answering(() => json({}));
+    const doc = list();
+    const sent = tickPoint(doc, 2, true);
+    await vi.advanceTimersByTimeAsync(1900);
+    expect(isTicked(doc, 2)).toBe(true);
+    await vi.advanceTimersByTimeAsync(200);
+    await sent;
+    expect(isTicked(doc, 2)).toBe(false);
+    vi.useRealTimers();
   });
 
   it("is not sent without a mission on board", async () => {

@@ -78,12 +78,15 @@ export function checklistObstacle(doc: ChecklistDoc | null | undefined): string 
     : `Tick the checklist first: ${left} points`;
 }
 
-/** Ticks on their way to the server, by what they are for. */
+/** So long what was put stands after the server has taken it, while the list that shows it is on its way. */
+const ON_ITS_WAY_MS = 2000;
+
+/** Ticks on their way to the server and back, by what they are for. */
 const underWay = signal<Readonly<Record<string, boolean>>>({});
 
 const keyOf = (digest: string, revision: string, number: number) => `${digest} ${revision} ${number}`;
 
-/** As the operator has just put it, until the server has answered; then as it is. */
+/** As the operator has just put it, until the server has refused it or its list shows it; then as it is. */
 export function isTicked(doc: ChecklistDoc, number: number): boolean {
   const key = keyOf(fly.value?.onboard.digest ?? "", doc.revision, number);
   return underWay.value[key] ?? Boolean(doc.points[number - 1]?.ticked_by);
@@ -95,7 +98,24 @@ export async function tickPoint(doc: ChecklistDoc, number: number, ticked: boole
   const key = keyOf(digest, doc.revision, number);
   underWay.value = { ...underWay.value, [key]: ticked };
   const body = { digest, revision: doc.revision, number, ticked };
-  await order({ place: CHECKLIST, path: "/api/flight/checklist", method: "PUT", body });
+  const answer = await order({ place: CHECKLIST, path: "/api/flight/checklist", method: "PUT", body });
+  if (answer !== null) await shown(number, ticked);
   const { [key]: _, ...others } = underWay.value;
   underWay.value = others;
+}
+
+/** Waits until the server's list shows the point so, or no longer can: the answer may overtake the list. */
+function shown(number: number, ticked: boolean): Promise<void> {
+  return new Promise((resolve) => {
+    const isShown = () => Boolean(fly.value?.checklist?.points[number - 1]?.ticked_by) === ticked;
+    const settle = () => {
+      clearTimeout(timer);
+      stop();
+      resolve();
+    };
+    const timer = setTimeout(settle, ON_ITS_WAY_MS);
+    const stop = fly.subscribe(() => {
+      if (isShown()) queueMicrotask(settle);
+    });
+  });
 }
