@@ -182,7 +182,9 @@ LOST = (
         follow=None,
         state=VehicleState(1, 1, armed=True, mode="GUIDED", heartbeat_t_mono_s=10.0, battery_share=0.97),
     ),
-    RecorderMessage(recorder=RecorderStatus(10.0, True, "flight.mcap", started_utc_s=time.time() - 754.0, bytes=40_000_000)),
+    RecorderMessage(
+        recorder=RecorderStatus(10.0, True, "flight.mcap", started_utc_s=time.time() - 754.0, bytes=40_000_000)
+    ),
     TextMessage(source="live", text=VehicleText(1000.0, 1, "The link has restarted: nothing avoided meanwhile.")),
     NodesMessage(
         nodes=[
@@ -229,9 +231,7 @@ def test_while_something_has_failed_the_bars_stay_readable_at_every_width(
 
 
 @pytest.mark.parametrize("who", WHO)
-def test_an_alert_and_who_is_in_charge_cut_no_figure_off(
-    station: Station, page: Page, who: str
-) -> None:
+def test_an_alert_and_who_is_in_charge_cut_no_figure_off(station: Station, page: Page, who: str) -> None:
     flies = VehicleMessage(
         source="live",
         now_mono_s=10.0,
