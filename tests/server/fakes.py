@@ -15,6 +15,7 @@ from server.errors import NotFoundError, NotReadyError, StaleRevisionError
 from server.flying.checklists import Checklists
 from server.heard.agents import Agents
 from server.library import Library
+from server.obstacles.obstacle_watch import Watch
 from server.schemas import (
     ClientMessage,
     Computation,
@@ -294,3 +295,17 @@ class _Asked:
             return _ANSWERS.get(name)
 
         return call
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now_s = 100.0
+
+    def __call__(self) -> float:
+        return self.now_s
+
+
+def watching(source: Any = "live") -> tuple[Watch, list[Any], Clock]:
+    """A watch over what it is given, what it tells, and its clock."""
+    told, clock = Told(), Clock()
+    return Watch(source, told, now_mono_s=clock, now_utc_s=lambda: 5000.0), told, clock

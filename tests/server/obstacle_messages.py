@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from server.scene.mirror import MapMirror
 from telemetry.topics.obstacles import (
     MapDelta,
     MapOrigin,
@@ -79,3 +80,9 @@ def delta(keys: ArrayLike, probability: ArrayLike = 200, explained: ArrayLike = 
         probability=np.broadcast_to(np.asarray(probability, np.uint8), (len(k),)).tobytes(),
         explained=np.broadcast_to(np.asarray(explained, np.uint8), (len(k),)).tobytes(),
     )
+
+
+def voxels_in(mirror: MapMirror) -> dict[tuple[int, ...], tuple[int, bool]]:
+    v = mirror.voxels()
+    rows = zip(v.keys.tolist(), v.probability.tolist(), v.explained.tolist(), strict=True)
+    return {tuple(key): (p, e) for key, p, e in rows}
