@@ -1,4 +1,4 @@
-"""The house as folders: no circle of files or folders anywhere, and no folder with more rooms than one takes in.
+"""The house as folders: no circle of files or folders anywhere, and no more rooms, pages and names than one takes in.
 
 ``python -m tests.rooms`` is part of ``make check``: import-linter knows layers of modules that are named to it, and
 would not see two folders deep inside a floor that import each other. A room of a folder is a module or folder
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ast
 import sys
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path, PurePosixPath
@@ -17,6 +17,12 @@ from pathlib import Path, PurePosixPath
 ROOT = Path(__file__).resolve().parent.parent
 FLOORS = ("mapping", "planning", "telemetry", "server")
 MOST_ROOMS = 22
+MOST_LINES = 400
+"""What one reads in a sitting: of a file of the product or its tests."""
+LINES_OF_A_SMALL_ONE = 40
+MOST_SMALL_ONES = 30
+MOST_SHARED_NAMES = 25
+"""Files of the product that are named alike make a reader look twice."""
 Graph = dict[str, set[str]]
 
 
@@ -36,6 +42,27 @@ def faults(root: Path) -> Iterator[str]:
         if len(inside) > MOST_ROOMS:
             yield f"{folder}: {len(inside)} rooms, more than {MOST_ROOMS}"
         yield from circle_in({room: arrows[folder][room] for room in sorted(inside)}, f"rooms of {folder}")
+    yield from _sizes(root)
+
+
+def _sizes(root: Path) -> Iterator[str]:
+    """Files that are too long, and too many that are short or named alike."""
+    product = {path: _lines(path) for floor in FLOORS for path in sorted((root / floor).rglob("*.py"))}
+    for path, lines in {**product, **{path: _lines(path) for path in sorted((root / "tests").rglob("*.py"))}}.items():
+        if lines > MOST_LINES:
+            yield f"{path.relative_to(root)}: {lines} lines, more than {MOST_LINES}"
+    modules = {path: lines for path, lines in product.items() if path.name != "__init__.py"}
+    small = sum(lines < LINES_OF_A_SMALL_ONE for lines in modules.values())
+    if small > MOST_SMALL_ONES:
+        yield f"{small} modules of under {LINES_OF_A_SMALL_ONE} lines, more than {MOST_SMALL_ONES}: join some"
+    names = Counter(path.stem for path in modules)
+    shared = sorted(name for name, files in names.items() if files > 1)
+    if len(shared) > MOST_SHARED_NAMES:
+        yield f"{len(shared)} names of several files, more than {MOST_SHARED_NAMES}: {', '.join(shared)}"
+
+
+def _lines(path: Path) -> int:
+    return len(path.read_text(encoding="utf-8").splitlines())
 
 
 def circle_in(graph: Mapping[str, set[str]], what: str) -> Iterator[str]:

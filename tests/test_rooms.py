@@ -1,4 +1,4 @@
-"""What is told of circles and crowded folders, on this house and on a small one."""
+"""What is told of circles, crowded folders, long files and shared names, on this house and on a small one."""
 
 from pathlib import Path
 
@@ -58,3 +58,37 @@ def test_a_crowded_folder_is_told(house: Path):
     for number in range(rooms.MOST_ROOMS):
         (house / f"server/low/box_{number}.py").touch()
     assert list(rooms.faults(house)) == [f"server/low: {rooms.MOST_ROOMS + 2} rooms, more than {rooms.MOST_ROOMS}"]
+
+
+@pytest.mark.parametrize("path", ["server/low/shelf.py", "tests/server/test_shelf.py"])
+def test_a_file_that_nobody_reads_in_a_sitting_is_told(house: Path, path: str):
+    (house / path).parent.mkdir(parents=True, exist_ok=True)
+    (house / path).write_text("\n" * rooms.MOST_LINES)
+    assert list(rooms.faults(house)) == []
+    (house / path).write_text("\n" * (rooms.MOST_LINES + 1))
+    assert list(rooms.faults(house)) == [f"{path}: 401 lines, more than 400"]
+
+
+def fill(house: Path, modules: list[str], lines: int) -> None:
+    for number, name in enumerate(modules):
+        path = house / f"mapping/box_{number // 20}/{name}.py"
+        path.parent.mkdir(exist_ok=True)
+        path.write_text("\n" * lines)
+
+
+def test_too_many_short_files_are_told(house: Path):
+    most = rooms.MOST_SMALL_ONES - 5
+    fill(house, [f"name_{number}" for number in range(most)], 39)
+    assert list(rooms.faults(house)) == []
+    fill(house, [f"name_{number}" for number in range(most + 1)], 39)
+    assert list(rooms.faults(house)) == ["31 modules of under 40 lines, more than 30: join some"]
+
+
+def test_too_many_names_of_several_files_are_told(house: Path):
+    names = [f"name_{number}" for number in range(rooms.MOST_SHARED_NAMES + 1)]
+    fill(house, names[:-1] * 2, 40)
+    assert list(rooms.faults(house)) == []
+    fill(house, [*names[:-1], *names], 40)
+    (house / "server/low/name_25.py").write_text("\n" * 40)
+    (told,) = rooms.faults(house)
+    assert told.startswith("26 names of several files, more than 25: name_0, ")
