@@ -230,18 +230,22 @@ def test_while_something_has_failed_the_bars_stay_readable_at_every_width(
     assert found == {}
 
 
+@pytest.mark.parametrize("late_s", [0.0, 16.0], ids=["now", "late"])
 @pytest.mark.parametrize("who", WHO)
-def test_an_alert_and_who_is_in_charge_cut_no_figure_off(station: Station, page: Page, who: str) -> None:
-    flies = VehicleMessage(
-        source="live",
-        now_mono_s=10.0,
-        follow=None,
-        state=VehicleState(1, 1, armed=True, mode="BRAKE", heartbeat_t_mono_s=10.0, battery_share=0.87),
-    )
-    _with_messages(page, (*AHEAD, flies, *LOST[2:4], *WHO[who]))
+def test_an_alert_and_who_is_in_charge_cut_no_figure_off(
+    station: Station, page: Page, who: str, *, late_s: float
+) -> None:
+    at_s = time.monotonic() - late_s
+    state = VehicleState(1, 1, armed=True, mode="BRAKE", heartbeat_t_mono_s=at_s, battery_share=0.87)
+    flies = VehicleMessage(source="live", now_mono_s=at_s, follow=None, state=state)
+    link = LinkMessage(link=LinkStatus(at_s, adopted=QUAD, state="live", warnings=("Another station commands it.",)))
+    silent = NodesMessage(nodes=[NodeDoc(name="radar", state="silent", restarts=0, text="Nothing is heard of it.")])
+    _with_messages(page, (link, *AHEAD[1:], flies, *LOST[2:4], silent, *WHO[who]))
     visit(page, station)
     page.get_by_test_id("tab-fly").click()
     expect(page.get_by_test_id("chip-battery")).to_contain_text("87")
+    if late_s:
+        expect(page.get_by_test_id("loss-acknowledge")).to_be_visible()
     found = {}
     for width in (1440, 1180, 1024, 820, 390):
         page.set_viewport_size({"width": width, "height": 844})

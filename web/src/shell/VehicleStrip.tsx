@@ -204,6 +204,7 @@ function Alerts() {
           level="near"
           title={linkStatus.value.status.warnings.join(" ")}
           testid="chip-link-warning"
+          class="node"
         />
       )}
       {node && (
