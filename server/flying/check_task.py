@@ -88,7 +88,7 @@ def check_start(
     report: Progress,
 ) -> Checked:
     """``rereferenced_m``: by how much the heights of what is on board were moved already."""
-    from telemetry.flight.preflight.fence_check import at_fence
+    from telemetry.flight.fence_actions import at_fence
     from telemetry.flight.preflight.parameters import flown_speeds, return_speeds
     from telemetry.flight.preflight.preflight import check
 

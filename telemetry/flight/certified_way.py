@@ -12,7 +12,7 @@ import numpy as np
 from mapping.geometry.frames import apart_m
 from planning.basics.plan_model import Firmware, VehicleProfile
 from planning.certificate.certificate_model import ClearanceParams, Reason
-from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint
+from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint, within_both
 from planning.guided.guided_model import RETURNS, Back, Demand, GuidedWay, Here, Look, Orbit, TakeOff, Wish
 from planning.guided.ways import guided_way
 from planning.margins.words import rounded_down, rounded_up
@@ -20,11 +20,12 @@ from planning.planner.part import FLIGHT_MARGIN_M, needed_part, rally_places
 from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.holes import fill_holes
 from telemetry.errors import NotAllowedError
+from telemetry.flight.fence_heights import heights_aboard
 from telemetry.flight.guided.handover import is_fresh
 from telemetry.flight.guided.script_targets import bearing_rad
 from telemetry.flight.home_watch import home_of
 from telemetry.flight.preflight.checks import STEEP_ENOUGH, accuracy_m, gnss_row
-from telemetry.flight.preflight.parameters import return_settings
+from telemetry.flight.preflight.parameters import return_as_flown
 from telemetry.flight.preflight.preflight import actual_home
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.topics.messages import GuidedTarget
@@ -44,10 +45,20 @@ class Flown:
     parameters: Mapping[str, float | None]
     """As read from it: ``telemetry.flight.preflight.parameters.NAMES``."""
     fence: Fence = NO_FENCE
-    """On board, and the plan's where there is one."""
+    """The shapes on board, and the plan's fence where there is one."""
     rally: tuple[RallyPoint, ...] = ()
     home_off_m: float = 0.0
     """So much above the ground home may lie, or below it: ``telemetry.flight.home_height``."""
+
+    def kept_fence(self, state: VehicleState) -> Fence:
+        """With the floor and ceiling at which the vehicle acts by its own settings."""
+        return within_both(self.fence, heights_aboard(self.parameters, _firmware(state)))
+
+    def fence_of_way(self, state: VehicleState) -> Fence:
+        """Without the vehicle's own floor: a way begins where the vehicle is, also below it after a take-off, where it
+        does not act yet."""
+        ceiling_m = self.kept_fence(state).ceiling_rel_home_m
+        return replace(self.fence, ceiling_rel_home_m=ceiling_m)
 
 
 def here_of(state: VehicleState, wish: Wish, now_s: float) -> Here:
@@ -99,7 +110,7 @@ def judged_way(
         speed_m_s,
         profile.max_climb_m_s,
         profile.max_descent_m_s,
-        fence=flown.fence,
+        fence=flown.fence_of_way(state),
         rally=flown.rally,
     )
     way = guided_way(fill_holes(ground if seen is None else seen)[0], ground, here, wish, demand)
@@ -111,7 +122,7 @@ def _own_return_known(way: GuidedWay, state: VehicleState, flown: Flown) -> Guid
 
     As in the check before the start, the pilot may accept it.
     """
-    settings = return_settings(flown.parameters, _firmware(state))
+    settings = return_as_flown(flown.parameters, _firmware(state))
     if settings.height_m is None:
         what = f"The vehicle does not tell its return height ({settings.parameter}): its own return is not certified."
         reason = Reason("return_unknown", what, "Ask again, or make sure that it is high enough.")
@@ -133,8 +144,8 @@ def demanded(state: VehicleState, flown: Flown) -> ClearanceParams:
     row = gnss_row(state, flown.profile)
     if row.state in ("bad", "unknown"):
         raise NotAllowedError(row.text, advice=row.mend)
-    clearance = _at_worse_end(flown)
-    height_m = return_settings(flown.parameters, _firmware(state)).height_m
+    clearance = _at_worse_end(state, flown)
+    height_m = return_as_flown(flown.parameters, _firmware(state)).height_m
     worse_m = max(0.0, max(accuracy_m(state)[:2]) - clearance.position_error_m)
     return replace(
         clearance,
@@ -145,14 +156,14 @@ def demanded(state: VehicleState, flown: Flown) -> ClearanceParams:
     )
 
 
-def _at_worse_end(flown: Flown) -> ClearanceParams:
+def _at_worse_end(state: VehicleState, flown: Flown) -> ClearanceParams:
     """The vehicle may be lower than it tells, and higher: then a fence's ceiling is nearer, and the highest height."""
     clearance, off_m = flown.clearance, flown.home_off_m
     most_m = clearance.max_height_above_ground_m
     return replace(
         clearance,
         required_clearance_m=clearance.required_clearance_m + abs(off_m),
-        position_error_m=clearance.position_error_m + (max(0.0, off_m) if flown.fence else 0.0),
+        position_error_m=clearance.position_error_m + (max(0.0, off_m) if flown.fence_of_way(state) else 0.0),
         max_height_above_ground_m=None if most_m is None else most_m - max(0.0, off_m),
     )
 

@@ -83,7 +83,7 @@ def taken_up(
     """
     home = _home(state, over.ground)
     part = _part(over, _places(over.ground, planned, state, home, flown))
-    mission = replace(_from_home(planned, home, part.ground), fence=flown.fence, rally=flown.rally)
+    mission = replace(_from_home(planned, home, part.ground), fence=flown.kept_fence(state), rally=flown.rally)
     if (row := checks.amsl_row(mission, state, home)) is not None:
         raise NotAllowedError(row.text, where="home", advice=row.mend)
     at_m = np.array([*_xy(part.ground, state.lat_deg, state.lon_deg), home.alt_dsm_m + (state.alt_rel_home_m or 0.0)])
@@ -104,7 +104,7 @@ def certified_on_board(
     """Of what was read back. Raises NotAllowedError, MissionError."""
     home = _home(state, over.ground)
     mission = mission_from_onboard(onboard, firmware, home=home)
-    mission = replace(mission, fence=flown.fence, rally=flown.rally)
+    mission = replace(mission, fence=flown.kept_fence(state), rally=flown.rally)
     part = _part(over, _places(over.ground, mission, state, home, flown))
     return _certified(part, mission, demanded(state, flown))
 

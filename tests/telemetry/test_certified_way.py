@@ -59,6 +59,15 @@ def test_a_return_that_is_not_known_is_not_certified_but_may_be_accepted(
     assert judged(ToHome(9.0), parameters).problem is None, "a certified way home does not need the vehicle's own"
 
 
+def test_the_vehicles_own_ceiling_is_kept_and_its_floor_stops_no_climb_from_below_it() -> None:
+    acts: dict[str, float | None] = TOLD | {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 9.0, "FENCE_ALT_MIN": 20.0}
+    assert judged(GoTo(30.0), acts | {"FENCE_ALT_MAX": 100.0}).problem is None
+    way = judged(GoTo(30.0), acts | {"FENCE_ALT_MAX": 30.0})
+    assert way.problem == "way"
+    assert "ceiling is at 30 m" in " ".join(way.reasons)
+    assert judged(GoTo(30.0), acts | {"FENCE_ALT_MAX": 30.0, "FENCE_ENABLE": 0.0}).problem is None
+
+
 @pytest.mark.parametrize("missing", ["home_lat_deg", "home_lon_deg", "home_alt_amsl_m"])
 def test_without_a_whole_home_nothing_is_certified_that_the_link_could_not_hold_against_it(missing: str) -> None:
     with pytest.raises(NotAllowedError, match="does not tell its home, place and height") as refused:

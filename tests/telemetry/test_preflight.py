@@ -224,6 +224,20 @@ def test_a_return_height_that_is_not_enough() -> None:
     assert checked(flown=below).ok()
 
 
+def test_a_ceiling_on_board_that_the_flight_or_its_return_would_not_keep_is_found() -> None:
+    acts = PARAMETERS | {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 1.0, "FENCE_ALT_MAX": 12.0, "FENCE_MARGIN": 2.0}
+    low = checked(parameters=acts)
+    assert row(low, "clearance").state == "bad"
+    assert "the fence's ceiling is at 12 m" in row(low, "clearance").text
+    wide = checked(parameters=acts | {"FENCE_ALT_MAX": 31.0})  # its return is cut to 29 m
+    assert wide.ok()
+    assert "returns at 29.00 m, below its ceiling and not at its RTL_ALT" in row(wide, "rtl_height").text
+    below = mission([(50.0, 150.0, 6.0), (50.0, 200.0, 6.0), (250.0, 200.0, 6.0), (250.0, 150.0, 6.0)])
+    cut = checked(flown=below, parameters=acts | {"FENCE_ALT_MAX": 10.5})
+    assert row(cut, "rtl_height").state == "bad"
+    assert "Its ceiling keeps it so low" in row(cut, "rtl_height").mend
+
+
 def test_return_settings_of_each_firmware() -> None:
     assert return_settings({"RTL_RETURN_ALT": 45.0}, "px4").height_m == 45.0
     for half_deg, within_m, steep_enough in (

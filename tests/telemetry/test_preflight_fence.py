@@ -8,8 +8,9 @@ import pytest
 
 from planning.basics.plan_model import Firmware
 from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint, circle, polygon
+from telemetry.flight.fence_actions import at_fence
 from telemetry.flight.preflight.checks import Row
-from telemetry.flight.preflight.fence_check import at_fence, fence_row, flown_within, sent_places
+from telemetry.flight.preflight.fence_check import fence_row, flown_within, sent_places
 from telemetry.topics.onboard_lists import PlacesOnboard
 
 FENCE = Fence(
@@ -19,7 +20,7 @@ FENCE = Fence(
 )
 RALLY = (RallyPoint(47.002, 8.002, 30.5),)
 PLANNED = (FENCE, RALLY)
-ACTS = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 7.0, "FENCE_ACTION": 1.0}
+ACTS = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 7.0, "FENCE_ACTION": 1.0, "FENCE_ALT_MAX": 80.0}
 
 
 def aboard() -> PlacesOnboard:
@@ -68,19 +69,52 @@ def test_a_plan_with_a_ceiling_alone_is_flown_within_the_vehicles_shapes_as_well
     assert within[1] == RALLY
 
 
-def test_a_floor_or_ceiling_is_never_said_to_be_on_board() -> None:
-    heights = replace(NO_FENCE, floor_rel_home_m=5.0, ceiling_rel_home_m=60.0)
-    row = judged(PlacesOnboard(), planned=(heights, ()))
-    assert row.text.startswith("Not on board, by no list: floor at 5 m above home, ceiling at 60 m above home.")
-    assert "FENCE_ALT_MAX" in row.mend
-    both = judged(aboard())
-    assert "on board, the plan's; the flight is held against it. Not on board, by no list: ceiling at 80 m" in both.text
-    shapes = replace(FENCE, ceiling_rel_home_m=None)
-    assert "Not on board" not in judged(aboard(), planned=(shapes, RALLY)).text
+HEIGHTS = replace(NO_FENCE, floor_rel_home_m=5.0, ceiling_rel_home_m=60.0)
+KEPT = ACTS | {"FENCE_TYPE": 15.0, "FENCE_ALT_MAX": 60.0, "FENCE_ALT_MIN": 5.0}
+
+
+@pytest.mark.parametrize(
+    ("changed", "state", "said"),
+    [
+        ({}, "good", "The plan's floor at 5 m above home is on board. The plan's ceiling at 60 m above home is on"),
+        ({"FENCE_ALT_MAX": 59.999}, "good", "ceiling at 60 m above home is on board."),
+        ({"FENCE_ALT_MAX": 50.0}, "good", "is on board, stricter: 50 m; the flight is held against that."),
+        ({"FENCE_ALT_MIN": 7.0}, "good", "is on board, stricter: 7 m"),
+        ({"FENCE_ALT_MAX": 70.0}, "accept", "The vehicle's ceiling, 70 m above home, is not the plan's, 60 m."),
+        ({"FENCE_ALT_MIN": 4.0}, "accept", "The vehicle's floor, 4 m above home, is not the plan's, 5 m."),
+        ({"FENCE_TYPE": 7.0}, "accept", "The plan's floor at 5 m above home is not on board."),
+        ({"FENCE_ENABLE": 0.0}, "accept", "The plan's ceiling at 60 m above home is not on board."),
+        ({"FENCE_ENABLE": 0.0, "FENCE_AUTOENABLE": 3.0}, "good", "The plan's ceiling at 60 m above home is on board."),
+        ({"FENCE_ENABLE": None}, "accept", "may not be on board: that was not read"),
+    ],
+)
+def test_floor_and_ceiling_are_compared_with_what_the_vehicle_acts_at(changed, state, said) -> None:
+    row = judged(PlacesOnboard(), planned=(HEIGHTS, ()), parameters=KEPT | changed)
+    assert row.state == state
+    assert said in row.text
+    assert ("--heights set" in row.mend) is (state == "accept")
+
+
+def test_px4_keeps_a_ceiling_and_no_floor() -> None:
+    row = judged(PlacesOnboard(), (HEIGHTS, ()), {"GF_ACTION": 3.0, "GF_MAX_VER_DIST": 60.0}, "px4")
+    assert (row.state, row.mend) == ("good", "")
+    assert "PX4 has no floor: the vehicle knows nothing of the plan's." in row.text
+    assert "The plan's ceiling at 60 m above home is on board." in row.text
+    row = judged(PlacesOnboard(), (HEIGHTS, ()), {"GF_ACTION": 3.0, "GF_MAX_VER_DIST": 0.0}, "px4")
+    assert row.state == "accept"
+
+
+def test_heights_of_the_vehicles_own_are_told_and_kept_to() -> None:
+    row = judged(PlacesOnboard(), planned=(NO_FENCE, ()), parameters=KEPT)
+    assert row.state == "good"
+    assert "The vehicle keeps a ceiling of its own at 60 m above home; so does the flight." in row.text
+    both = judged(aboard(), parameters=KEPT | {"FENCE_ALT_MAX": 80.0, "FENCE_TYPE": 5.0})
+    assert "on board, the plan's; the flight is held against it. The plan's ceiling at 80 m above home is" in both.text
 
 
 def test_nothing_anywhere_is_no_row() -> None:
-    assert fence_row((NO_FENCE, ()), PlacesOnboard(), ACTS, "ardupilot") is None
+    for off in ({"FENCE_ENABLE": 0.0}, {"FENCE_TYPE": 4.0}):
+        assert fence_row((NO_FENCE, ()), PlacesOnboard(), ACTS | off, "ardupilot") is None
 
 
 @pytest.mark.parametrize(

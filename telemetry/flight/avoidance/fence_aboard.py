@@ -10,24 +10,30 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import get_args
 
 import numpy as np
 
 from mapping.geometry.arrays import F64
 from mapping.geometry.frames import offset_m
+from planning.basics.plan_model import Firmware
 from planning.errors import FormatError
 from planning.fence.distance import one_to_polygon, to_circle
 from planning.fence.fence_model import Fence, FenceCircle, FencePolygon, LatLon
 from planning.fence.judge import CIRCLE_SHARE, named_shapes
 from planning.formats.fence_items import fence_of
+from telemetry.flight.fence_heights import heights_aboard
 from telemetry.mavlink.items import mission_items
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.onboard_lists import Item
 from telemetry.topics.vehicle import VehicleState
 
-CEILING_BIT = 1
-"""Of FENCE_TYPE: the highest height."""
-CEILING_PARAMETERS = ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_ALT_MAX")
+CEILING_PARAMETERS = (
+    *("FENCE_ENABLE", "FENCE_AUTOENABLE", "FENCE_TYPE", "FENCE_ALT_MAX"),
+    *("GF_ACTION", "GF_MAX_VER_DIST"),
+)
+"""ArduPilot's and PX4's: a vehicle has those of one."""
+FIRMWARES: tuple[Firmware, ...] = get_args(Firmware)
 SAME_M = 0.01
 """Who is nearer than the margin already may go on so near."""
 
@@ -79,9 +85,8 @@ class FenceAboard:
     @property
     def highest_m(self) -> float:
         """Above home, with the margin; inf where no ceiling is known to act."""
-        enabled, kinds, top_m = (self._parameters.get(name) for name in CEILING_PARAMETERS)
-        acts = bool(enabled) and kinds is not None and bool(int(kinds) & CEILING_BIT)
-        return top_m - self.margin_m if acts and top_m is not None else math.inf
+        found = (heights_aboard(self._parameters, firmware).ceiling_rel_home_m for firmware in FIRMWARES)
+        return min((top_m - self.margin_m for top_m in found if top_m is not None), default=math.inf)
 
     def why_not_along(self, state: VehicleState, places: Sequence[GuidedTarget]) -> str:
         """Why a way from where the vehicle is would breach it, leg by leg; empty: it keeps inside."""

@@ -24,6 +24,7 @@ AWAY_M = 3.0
 LARGEST_AMSL_OFFSET_M = 0.3
 WORTH_A_WORD_M = 0.05
 STEEP_ENOUGH = "Set RTL_CONE_SLOPE to 3 (PX4: RTL_CONE_ANG to 45, RTL_MIN_DIST to 10)."
+_BELOW_CEILING = "Its ceiling keeps it so low (FENCE_ALT_MAX less FENCE_MARGIN): raise that, or plan lower."
 RETURN_REASONS = ("return_height", "return_near_home", "return_unknown")
 TYPICAL_ACCURACY_M: dict[GnssFix, float] = {"3d": 2.5, "dgps": 1.0, "rtk_float": 0.5, "rtk_fixed": 0.1}
 """Of receivers that do not say how accurate they are."""
@@ -161,7 +162,7 @@ def return_row(certificate: Certificate | None, settings: ReturnSettings, cleara
     if reason is not None:
         enough = reason.code == "return_height" and math.isfinite(needed_m)
         mend = f"Set {settings.value_for(needed_m)} on the vehicle." if enough else reason.mend
-        return Row("rtl_height", "bad", reason.text, mend)
+        return Row("rtl_height", "bad", reason.text, _BELOW_CEILING if enough and settings.below_ceiling else mend)
     if height_m is None:
         text = f"The vehicle does not tell its return height ({settings.parameter}); {planned}."
         return Row("rtl_height", "accept", text, f"Make sure it is {rounded_up(needed_m)} m or more.")
@@ -171,7 +172,8 @@ def return_row(certificate: Certificate | None, settings: ReturnSettings, cleara
     need = (
         f"the ways home need {rounded_up(needed_m)} m" if needed_m > 0 else "from everywhere it is high enough itself"
     )
-    return Row("rtl_height", "good", f"The vehicle returns at {height_m:.2f} m; {need}.")
+    lowered = f", below its ceiling and not at its {settings.parameter}" if settings.below_ceiling else ""
+    return Row("rtl_height", "good", f"The vehicle returns at {height_m:.2f} m{lowered}; {need}.")
 
 
 def battery_row(state: VehicleState, profile: VehicleProfile, predicted_s: float | None) -> Row:

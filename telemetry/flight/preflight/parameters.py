@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from planning.basics.mav_cmd import MavCmd
 from planning.basics.plan_model import Firmware
 from planning.certificate.commands import STRAIGHT
 from planning.certificate.returns import NEAR_M, SLOPE
 from planning.flight_time.return_speeds import ReturnSpeeds
+from telemetry.flight.fence_heights import highest_return_m
 from telemetry.flight.guided.script_targets import GROUND_SPEEDS
 from telemetry.topics.onboard_lists import OnboardMission
 
@@ -21,10 +22,10 @@ NAMES: dict[Firmware, tuple[str, ...]] = {
         *("WPNAV_SPEED_UP", "WP_SPD_UP", "WPNAV_SPEED_DN", "WP_SPD_DN", "RTL_LOIT_TIME"),
         *("LAND_SPEED", "LAND_SPD_MS", "LAND_SPEED_HIGH", "LAND_SPD_HIGH_MS", "LAND_ALT_LOW", "LAND_ALT_LOW_M"),
         *("RTL_ALT_FINAL", "RTL_ALT_FINAL_M"),
-        *("FENCE_ENABLE", "FENCE_TYPE", "FENCE_ACTION", "FENCE_ALT_MAX"),
+        *("FENCE_ENABLE", "FENCE_TYPE", "FENCE_ACTION", "FENCE_ALT_MAX", "FENCE_ALT_MIN", "FENCE_MARGIN"),
     ),
     "px4": (
-        *("RTL_RETURN_ALT", "RTL_CONE_ANG", "RTL_MIN_DIST", "RTL_LAND_DELAY", "GF_ACTION"),
+        *("RTL_RETURN_ALT", "RTL_CONE_ANG", "RTL_MIN_DIST", "RTL_LAND_DELAY", "GF_ACTION", "GF_MAX_VER_DIST"),
         *("MPC_XY_CRUISE", "MPC_Z_V_AUTO_UP", "MPC_Z_V_AUTO_DN", "MPC_LAND_SPEED", "MPC_LAND_ALT1"),
     ),
 }
@@ -49,6 +50,8 @@ class ReturnSettings:
     """Its name, to be set when it has to change."""
     steep_enough: bool
     """Close to home it climbs as much as certificates take for granted."""
+    below_ceiling: bool = False
+    """The ceiling on board keeps ``height_m`` lower than ``parameter`` says."""
 
     def value_for(self, height_m: float) -> str:
         """What to write into ``parameter`` for a height, rounded up to whole metres."""
@@ -69,6 +72,14 @@ def return_settings(parameters: Mapping[str, float | None], firmware: Firmware) 
         return ReturnSettings(known["RTL_ALT_M"], "RTL_ALT_M", steep_enough)
     height_m = known["RTL_ALT"] / 100.0 if "RTL_ALT" in known else None
     return ReturnSettings(height_m, "RTL_ALT", steep_enough)
+
+
+def return_as_flown(parameters: Mapping[str, float | None], firmware: Firmware) -> ReturnSettings:
+    """As the vehicle is set, and no higher than its own ceiling lets it."""
+    own, most_m = return_settings(parameters, firmware), highest_return_m(parameters, firmware)
+    if own.height_m is None or own.height_m <= most_m:
+        return own
+    return replace(own, height_m=most_m, below_ceiling=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +113,7 @@ def flown_speeds(parameters: Mapping[str, float | None], onboard: OnboardMission
 def return_speeds(parameters: Mapping[str, float | None], firmware: Firmware) -> ReturnSpeeds:
     """As the vehicle is set. PX4's delay before it lands counts where it is one: below 0 it never lands by itself,
     nor does ArduPilot with a final height."""
-    height_m = return_settings(parameters, firmware).height_m
+    height_m = return_as_flown(parameters, firmware).height_m
     if firmware == "px4":
         cruise_m_s, up_m_s, down_m_s, land_m_s, low_m, wait_s = (
             _first(parameters, (name,))[1]

@@ -14,7 +14,7 @@ from planning.certificate.clearance import certify
 from planning.certificate.home_ground import HomeGround
 from planning.certificate.home_stand import ground_at
 from planning.errors import MissionError
-from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint
+from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint, within_both
 from planning.flight_time.predict import predict_duration
 from planning.flight_time.return_speeds import ReturnSpeeds
 from planning.formats.commands import has_position
@@ -22,10 +22,11 @@ from planning.missions.flown import AMSL_FRAMES, flown_line
 from planning.terrain.dsm import Dsm
 from planning.terrain.holes import fill_holes
 from planning.terrain.vertical_datum import is_amsl
+from telemetry.flight.fence_heights import heights_aboard
 from telemetry.flight.preflight import checks
 from telemetry.flight.preflight.checks import Row
 from telemetry.flight.preflight.fence_check import fence_row, flown_within
-from telemetry.flight.preflight.parameters import return_settings, return_speeds
+from telemetry.flight.preflight.parameters import return_as_flown, return_speeds
 from telemetry.mavlink.items import mission_from_onboard
 from telemetry.topics.onboard_lists import OnboardMission, PlacesOnboard
 from telemetry.topics.vehicle import VehicleState
@@ -122,14 +123,15 @@ def check(
     ``fence`` and ``rally`` are the plan's: what is on board is held against them too. ``aboard``: what the vehicle
     itself holds of them; None: it was not asked.
     """
-    settings = return_settings(parameters, firmware)
+    settings = return_as_flown(parameters, firmware)
     home = actual_home(state, dsm)
     shift_m = _shift(home, planned_home, dsm)
     mission = _mission(onboard, firmware, home, dsm)
     planned = (fence, rally)
     row = None if aboard is None else fence_row(planned, aboard, parameters, firmware)
     within = planned if aboard is None or (row is not None and row.state == "bad") else flown_within(planned, aboard)
-    mission = None if mission is None else replace(mission, fence=within[0], rally=within[1])
+    kept_to = within_both(within[0], heights_aboard(parameters, firmware))
+    mission = None if mission is None else replace(mission, fence=kept_to, rally=within[1])
     surface = fill_holes(dsm)[0] if dsm is not None else None
     height_m = clearance.rtl_height_m if settings.height_m is None else settings.height_m
     demanded = replace(clearance, rtl_height_m=height_m, set_down_m=0.0)

@@ -1,0 +1,193 @@
+"""Floor and ceiling of a fence on board: parameters of the autopilot, for no list of a fence holds them.
+
+Both autopilots count them from their own home, as a plan does. ArduPilot acts at FENCE_ALT_MAX and FENCE_ALT_MIN where
+FENCE_TYPE says so and the fence is on, does not arm where both leave no room for twice its FENCE_MARGIN, and returns no
+higher than the ceiling less that margin. PX4 acts at GF_MAX_VER_DIST and has no floor.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from planning.basics.plan_model import Firmware
+from planning.fence.fence_model import NO_FENCE, Fence
+from telemetry.errors import NotAllowedError
+from telemetry.flight.fence_actions import (
+    CEILING_BIT,
+    CIRCLE_BIT,
+    FLOOR_BIT,
+    SHAPES_BIT,
+    at_fence,
+    is_switched_on,
+)
+
+NAMES: dict[Firmware, tuple[str, ...]] = {
+    "ardupilot": (
+        *("FENCE_ENABLE", "FENCE_AUTOENABLE", "FENCE_TYPE", "FENCE_ACTION", "FENCE_ALT_MAX", "FENCE_ALT_MIN"),
+        *("FENCE_MARGIN", "FENCE_RADIUS"),
+    ),
+    "px4": ("GF_ACTION", "GF_MAX_VER_DIST", "GF_MAX_HOR_DIST"),
+}
+"""What to read before they are set."""
+MARGIN_M, DEEPEST_M = 2.0, -100.0
+"""ArduPilot's own margin where it does not tell it, and the lowest FENCE_ALT_MIN with which it arms."""
+HOLD = 2.0
+"""GF_ACTION, as PX4 comes."""
+SAME_M = 0.005
+"""Single precision, as vehicles keep it, differs by less."""
+NO_FLOOR = "PX4 has no floor: the vehicle knows nothing of the plan's."
+
+
+@dataclass(frozen=True, slots=True)
+class HeightChange:
+    name: str
+    before: float
+    after: float
+    unit: str = ""
+
+    @property
+    def words(self) -> str:
+        unit = f" {self.unit}" if self.unit else ""
+        return f"{self.name} {self.before:g} -> {self.after:g}{unit}"
+
+    @property
+    def switches(self) -> bool:
+        """It says what acts, not at which height."""
+        return not self.unit
+
+
+@dataclass(frozen=True, slots=True)
+class HeightChanges:
+    """What is to be written so that the vehicle keeps a plan's floor and ceiling, in this order."""
+
+    changes: tuple[HeightChange, ...]
+    """None where all is so already. The fence is switched on last."""
+    notes: tuple[str, ...]
+    """What this means besides, in whole sentences."""
+
+
+def heights_aboard(parameters: Mapping[str, float | None], firmware: Firmware) -> Fence:
+    """At which the vehicle acts, above home; without what does not act or was not read."""
+    if not is_switched_on(parameters, firmware):
+        return NO_FENCE
+    if firmware == "px4":
+        most_m = parameters.get("GF_MAX_VER_DIST")
+        return Fence(ceiling_rel_home_m=most_m if most_m is not None and most_m > 0 else None)
+    kinds = int(parameters.get("FENCE_TYPE") or 0)
+    return Fence(
+        floor_rel_home_m=parameters.get("FENCE_ALT_MIN") if kinds & FLOOR_BIT else None,
+        ceiling_rel_home_m=parameters.get("FENCE_ALT_MAX") if kinds & CEILING_BIT else None,
+    )
+
+
+def highest_return_m(parameters: Mapping[str, float | None], firmware: Firmware) -> float:
+    """Above home: ArduPilot lowers its return to its ceiling less its margin, without a word; inf: nothing does."""
+    top_m = heights_aboard(parameters, firmware).ceiling_rel_home_m
+    if firmware == "px4" or top_m is None:
+        return math.inf
+    return top_m - _margin_m(parameters)
+
+
+def height_changes(
+    fence: Fence, parameters: Mapping[str, float | None], firmware: Firmware, *, home_rises_m: float = 0.0
+) -> HeightChanges:
+    """``home_rises_m``: the vehicle's home above the one that was planned for. The worse end counts: the vehicle's
+    ceiling is above neither, its floor below neither.
+
+    Raises NotAllowedError where the vehicle cannot have them, or would not arm with them.
+    """
+    floor_m, ceiling_m = fence.floor_rel_home_m, fence.ceiling_rel_home_m
+    if floor_m is not None:
+        floor_m = math.ceil(round(100 * (floor_m + max(0.0, -home_rises_m)), 3)) / 100
+    if ceiling_m is not None:
+        ceiling_m = math.floor(round(100 * (ceiling_m - max(0.0, home_rises_m)), 3)) / 100
+    if floor_m is None and ceiling_m is None:
+        raise NotAllowedError("The fence has neither floor nor ceiling.", advice="Give it one under Fence in Plan.")
+    if ceiling_m is not None and ceiling_m <= 0:
+        what = f"A ceiling at {ceiling_m:g} m above home is none: the vehicle stands above it on the ground."
+        raise NotAllowedError(what, advice="Raise the ceiling, or start from lower ground.")
+    made = _px4 if firmware == "px4" else _ardupilot
+    wanted, notes = made(floor_m, ceiling_m, fence, parameters)
+    found = tuple(each for each in wanted if abs(each.before - each.after) > SAME_M)
+    after = dict(parameters) | {each.name: each.after for each in found}
+    return HeightChanges(found, (*notes, *filter(None, (at_fence(after, firmware),))))
+
+
+def _px4(
+    floor_m: float | None, ceiling_m: float | None, fence: Fence, parameters: Mapping[str, float | None]
+) -> tuple[list[HeightChange], list[str]]:
+    del fence
+    if ceiling_m is None:
+        raise NotAllowedError(NO_FLOOR, advice="Only a ceiling can be set there.")
+    action = _told(parameters, "GF_ACTION")
+    wanted = [HeightChange("GF_MAX_VER_DIST", _told(parameters, "GF_MAX_VER_DIST"), ceiling_m, "m")]
+    notes = [] if floor_m is None else [NO_FLOOR]
+    if action == 0:
+        wanted.append(HeightChange("GF_ACTION", action, HOLD))
+        notes.append("With GF_ACTION the vehicle's whole fence is switched on.")
+        if (radius_m := parameters.get("GF_MAX_HOR_DIST")) is not None and radius_m > 0:
+            notes.append(f"So is its distance from home: GF_MAX_HOR_DIST {radius_m:g} m.")
+    return wanted, notes
+
+
+def _ardupilot(
+    floor_m: float | None, ceiling_m: float | None, fence: Fence, parameters: Mapping[str, float | None]
+) -> tuple[list[HeightChange], list[str]]:
+    kinds_before, was_on = int(_told(parameters, "FENCE_TYPE")), bool(is_switched_on(parameters, "ardupilot"))
+    own = CEILING_BIT * (ceiling_m is not None) | FLOOR_BIT * (floor_m is not None)
+    own |= SHAPES_BIT * bool(fence.polygons or fence.circles)
+    # What acts already goes on to act; what a fence that is off would bring along is nobody's wish.
+    kinds = kinds_before | own if was_on else own
+    wanted: list[HeightChange] = []
+    if ceiling_m is not None:
+        wanted.append(HeightChange("FENCE_ALT_MAX", _told(parameters, "FENCE_ALT_MAX"), ceiling_m, "m"))
+    if floor_m is not None:
+        wanted.append(HeightChange("FENCE_ALT_MIN", _told(parameters, "FENCE_ALT_MIN"), floor_m, "m"))
+    wanted.append(HeightChange("FENCE_TYPE", kinds_before, kinds))
+    wanted.append(HeightChange("FENCE_ENABLE", _told(parameters, "FENCE_ENABLE"), 1))
+    margin_m = _margin_m(parameters)
+    _refuse_unarmable(floor_m, ceiling_m, margin_m, parameters)
+    notes = []
+    if kinds_before & CIRCLE_BIT and not kinds & CIRCLE_BIT:
+        radius_m = parameters.get("FENCE_RADIUS")
+        size = "" if radius_m is None else f", {radius_m:g} m"
+        notes.append(f"The circle around home (FENCE_RADIUS{size}) stays off: the plan has none.")
+    if ceiling_m is not None:
+        notes.append(f"The vehicle then returns at {ceiling_m - margin_m:g} m at most: FENCE_MARGIN below the ceiling.")
+    if floor_m is not None:
+        notes.append(
+            "The floor acts once the vehicle was above it, and not while it lands; before ArduPilot 4.6 it may not."
+        )
+    return wanted, notes
+
+
+def _refuse_unarmable(
+    floor_m: float | None, ceiling_m: float | None, margin_m: float, parameters: Mapping[str, float | None]
+) -> None:
+    """ArduPilot compares both when it arms, whether they act or not."""
+    low_m = parameters.get("FENCE_ALT_MIN") if floor_m is None else floor_m
+    high_m = parameters.get("FENCE_ALT_MAX") if ceiling_m is None else ceiling_m
+    if floor_m is not None and floor_m < DEEPEST_M:
+        what = f"With a floor at {floor_m:g} m the vehicle would not arm: {DEEPEST_M:g} m is its lowest."
+        raise NotAllowedError(what, where="FENCE_ALT_MIN", advice="Raise the floor, or leave it out.")
+    if low_m is not None and high_m is not None and high_m - low_m <= 2 * margin_m:
+        what = (
+            f"The vehicle would not arm: between {low_m:g} m (FENCE_ALT_MIN) and {high_m:g} m (FENCE_ALT_MAX) it wants"
+            f" more than twice its FENCE_MARGIN of {margin_m:g} m."
+        )
+        raise NotAllowedError(what, where="FENCE_MARGIN", advice="Change one of them under Parameters, or the plan.")
+
+
+def _margin_m(parameters: Mapping[str, float | None]) -> float:
+    told_m = parameters.get("FENCE_MARGIN")
+    return MARGIN_M if told_m is None else told_m
+
+
+def _told(parameters: Mapping[str, float | None], name: str) -> float:
+    value = parameters.get(name)
+    if value is None or not math.isfinite(value):
+        what = f"The vehicle does not tell {name}: its floor and ceiling cannot be set."
+        raise NotAllowedError(what, where=name, advice="Look at the link; or its firmware has no such fence.")
+    return value

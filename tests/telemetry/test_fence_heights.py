@@ -1,0 +1,129 @@
+"""A plan's floor and ceiling as the parameters that an autopilot keeps them in."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from planning.fence.fence_model import NO_FENCE, Fence, circle
+from telemetry.errors import NotAllowedError
+from telemetry.flight.fence_heights import (
+    HeightChanges,
+    height_changes,
+    heights_aboard,
+    highest_return_m,
+)
+from telemetry.flight.preflight.parameters import return_as_flown
+
+COPTER: dict[str, float | None] = {
+    "FENCE_ENABLE": 0.0, "FENCE_AUTOENABLE": None, "FENCE_TYPE": 7.0, "FENCE_ACTION": 1.0, "FENCE_ALT_MAX": 100.0,
+    "FENCE_ALT_MIN": -10.0, "FENCE_MARGIN": 2.0, "FENCE_RADIUS": 300.0,
+}  # fmt: skip
+PX4: dict[str, float | None] = {"GF_ACTION": 2.0, "GF_MAX_VER_DIST": 0.0, "GF_MAX_HOR_DIST": 0.0}
+BOTH = Fence(floor_rel_home_m=5.0, ceiling_rel_home_m=60.0)
+SHAPE = circle(47.0, 8.0, 50.0, inclusion=True, where="t")
+
+
+def words(made: HeightChanges) -> list[str]:
+    return [change.words for change in made.changes]
+
+
+def after(made: HeightChanges, before: dict[str, float | None]) -> dict[str, float | None]:
+    return before | {change.name: change.after for change in made.changes}
+
+
+def test_a_fence_that_is_off_comes_on_with_what_the_plan_has_and_nothing_else() -> None:
+    made = height_changes(BOTH, COPTER, "ardupilot")
+    assert words(made) == [
+        "FENCE_ALT_MAX 100 -> 60 m", "FENCE_ALT_MIN -10 -> 5 m", "FENCE_TYPE 7 -> 9", "FENCE_ENABLE 0 -> 1",
+    ]  # fmt: skip
+    said = " ".join(made.notes)
+    assert "The circle around home (FENCE_RADIUS, 300 m) stays off" in said
+    assert "returns at 58 m at most" in said
+    assert "At its fence the vehicle returns, or lands where it cannot (FENCE_ACTION 1)." in said
+
+
+@pytest.mark.parametrize("on", [{"FENCE_ENABLE": 1.0}, {"FENCE_AUTOENABLE": 3.0}])
+def test_what_acts_already_goes_on_to_act(on: dict[str, float]) -> None:
+    made = height_changes(BOTH, COPTER | on, "ardupilot")
+    assert "FENCE_TYPE 7 -> 15" in words(made)
+    assert "stays off" not in " ".join(made.notes)
+
+
+def test_shapes_of_the_plan_act_too_once_it_is_switched_on() -> None:
+    made = height_changes(Fence(circles=(SHAPE,), ceiling_rel_home_m=60.0), COPTER, "ardupilot")
+    assert "FENCE_TYPE 7 -> 5" in words(made)
+
+
+def test_what_is_on_board_already_is_not_written_again() -> None:
+    once = after(height_changes(BOTH, COPTER, "ardupilot"), COPTER)
+    assert height_changes(BOTH, once, "ardupilot").changes == ()
+    assert heights_aboard(once, "ardupilot") == BOTH
+
+
+def test_px4_takes_a_ceiling_says_that_it_has_no_floor_and_is_switched_on() -> None:
+    made = height_changes(BOTH, PX4, "px4")
+    assert words(made) == ["GF_MAX_VER_DIST 0 -> 60 m"]
+    assert "PX4 has no floor" in made.notes[0]
+    off = height_changes(BOTH, PX4 | {"GF_ACTION": 0.0, "GF_MAX_HOR_DIST": 80.0}, "px4")
+    assert words(off) == ["GF_MAX_VER_DIST 0 -> 60 m", "GF_ACTION 0 -> 2"]
+    assert "GF_MAX_HOR_DIST 80 m" in " ".join(off.notes)
+    assert "At its fence the vehicle holds its place (GF_ACTION 2)." in off.notes
+
+
+@pytest.mark.parametrize(
+    ("fence", "changed", "firmware", "said"),
+    [
+        (NO_FENCE, {}, "ardupilot", "neither floor nor ceiling"),
+        (Fence(ceiling_rel_home_m=-3.0), {}, "ardupilot", "A ceiling at -3 m above home is none"),
+        (Fence(ceiling_rel_home_m=0.004), {}, "px4", "A ceiling at 0 m above home is none"),
+        (Fence(floor_rel_home_m=-120.0), {}, "ardupilot", "-100 m is its lowest"),
+        (Fence(floor_rel_home_m=5.0, ceiling_rel_home_m=9.0), {}, "ardupilot", "The vehicle would not arm"),
+        (Fence(floor_rel_home_m=97.0), {}, "ardupilot", "The vehicle would not arm"),
+        (Fence(ceiling_rel_home_m=20.0), {"FENCE_ALT_MIN": 30.0}, "ardupilot", "The vehicle would not arm"),
+        (Fence(floor_rel_home_m=5.0), {}, "px4", "PX4 has no floor"),
+        (BOTH, {"FENCE_TYPE": None}, "ardupilot", "does not tell FENCE_TYPE"),
+        (BOTH, {"FENCE_ALT_MAX": math.nan}, "ardupilot", "does not tell FENCE_ALT_MAX"),
+        (BOTH, {"GF_MAX_VER_DIST": None}, "px4", "does not tell GF_MAX_VER_DIST"),
+    ],
+)
+def test_what_a_vehicle_cannot_keep_or_would_not_arm_with_is_refused(fence, changed, firmware, said: str) -> None:
+    with pytest.raises(NotAllowedError, match=said):
+        height_changes(fence, (PX4 if firmware == "px4" else COPTER) | changed, firmware)
+
+
+@given(
+    low_m=st.floats(-90, 90), room_m=st.floats(4.1, 300), rises_m=st.floats(-20, 20), kinds=st.integers(0, 15),
+    on=st.booleans(),
+)  # fmt: skip
+def test_the_vehicles_band_is_never_wider_than_the_plans_from_either_home(low_m, room_m, rises_m, kinds, on) -> None:
+    fence = Fence(floor_rel_home_m=low_m, ceiling_rel_home_m=low_m + room_m)
+    before: dict[str, Any] = COPTER | {"FENCE_TYPE": float(kinds), "FENCE_ENABLE": float(on)}
+    try:
+        made = height_changes(fence, before, "ardupilot", home_rises_m=rises_m)
+    except NotAllowedError:
+        assume(False)
+        raise
+    own = heights_aboard(after(made, before), "ardupilot")
+    assert own.floor_rel_home_m is not None
+    assert own.ceiling_rel_home_m is not None
+    for planned_home_m in (0.0, -rises_m):  # as seen from the vehicle's
+        assert own.floor_rel_home_m >= low_m + planned_home_m - 0.006
+        assert own.ceiling_rel_home_m <= low_m + room_m + planned_home_m + 0.006
+
+
+def test_the_return_stays_below_the_ceiling_by_the_vehicles_margin() -> None:
+    """ArduCopter cuts its return height to FENCE_ALT_MAX - FENCE_MARGIN where the ceiling is on."""
+    kept = COPTER | {"FENCE_ENABLE": 1.0, "FENCE_ALT_MAX": 30.0, "RTL_ALT": 3000.0}
+    assert highest_return_m(kept, "ardupilot") == 28.0
+    found = return_as_flown(kept, "ardupilot")
+    assert (found.height_m, found.below_ceiling) == (28.0, True)
+    for changed in ({"FENCE_ENABLE": 0.0}, {"FENCE_TYPE": 6.0}, {"FENCE_ALT_MAX": None}, {"RTL_ALT": 2800.0}):
+        own = return_as_flown(kept | changed, "ardupilot")
+        assert (own.height_m, own.below_ceiling) == ((changed.get("RTL_ALT") or 3000.0) / 100, False)
+    assert return_as_flown(kept | {"FENCE_MARGIN": None}, "ardupilot").height_m == 28.0
+    assert highest_return_m({"GF_ACTION": 2.0, "GF_MAX_VER_DIST": 30.0}, "px4") == math.inf
