@@ -129,8 +129,8 @@ class Autopilot(SimulatedPilot):
         return "accepted"
 
     def go_to(self, goal_neu: Vec3, *, heading_rad: float | None = None) -> Answer:
-        """Only in GUIDED and in the air."""
-        if not isinstance(self.mode, Guided) or not self.flying:
+        """Only in GUIDED, in the air, and within the fence."""
+        if not isinstance(self.mode, Guided) or not self.flying or not self.fence.allows(goal_neu, self.home_neu):
             return "failed"
         self.mode.go_to(self, goal_neu)
         if heading_rad is not None:
@@ -140,8 +140,8 @@ class Autopilot(SimulatedPilot):
         return "accepted"
 
     def follow(self, goal_neu: Vec3, v_neu: Vec3, *, heading_rad: float | None = None) -> Answer:
-        """Only in GUIDED and in the air."""
-        if not isinstance(self.mode, Guided) or not self.flying:
+        """Only in GUIDED, in the air, and within the fence."""
+        if not isinstance(self.mode, Guided) or not self.flying or not self.fence.allows(goal_neu, self.home_neu):
             return "failed"
         self.mode.follow(self, goal_neu, v_neu)
         return self._turned(heading_rad)
@@ -194,6 +194,7 @@ class Autopilot(SimulatedPilot):
         self.now_s += dt_s
         self.p_neu, self.v_neu = sensed.p_neu, sensed.v_neu
         self._boot()
+        self._keep_to_fence()
         if not self.armed:
             self.heading_goal_rad = sensed.heading_rad
             self._remind()
@@ -258,6 +259,8 @@ class Autopilot(SimulatedPilot):
             return f"{self.mode.name} mode not armable"
         if not self.home_known or (self.mode.needs_position and not self.position_ok):
             return "Need Position Estimate"
+        if (beyond := self.fence.why_not_arm()) is not None:
+            return beyond
         return "Battery 1 low voltage failsafe" if self._battery.level > 1 else None
 
     def _set_home(self) -> None:
@@ -318,6 +321,20 @@ class Autopilot(SimulatedPilot):
         for finding in (self._gcs.check(self.parameters, self.now_s), battery):
             if finding:
                 self._act(finding)
+
+    def _keep_to_fence(self) -> None:
+        """Looked at on the ground as well: it does not arm beyond its fence."""
+        if not self.position_ok:
+            return
+        landing = not self.flying or self.mode.stage == "landing"
+        news = self.fence.check(self.p_neu, self.home_neu, self.now_s, flying=self.flying, landing=landing)
+        for text in news.texts:
+            self.say(5, text)
+        if news.modes and self.armed:
+            if self.flying:
+                any(self.set_mode(mode) == "accepted" for mode in news.modes)
+            else:
+                self.disarm()
 
     def _act(self, finding: FailsafeFinding) -> None:
         self.say(finding.severity, finding.text)

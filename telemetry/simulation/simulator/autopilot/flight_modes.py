@@ -242,7 +242,7 @@ class Return:
         self.stage = self._land.stage
 
     def _height_m(self, pilot: SimulatedPilot) -> float:
-        """Above home: RTL_ALT, less within the cone around home, never below where the vehicle is."""
+        """Above home: RTL_ALT, less within the cone around home or below a ceiling, never below where it is."""
         p = pilot.parameters
         now_m = max(0.0, self._path.start_neu[2] - pilot.home_neu[2])
         climbed_m = now_m + p["RTL_CLIMB_MIN"] / 100
@@ -250,7 +250,7 @@ class Return:
         if (slope := p["RTL_CONE_SLOPE"]) >= SLOPE_FROM:
             away_m = math.dist(self._path.start_neu[:2], pilot.home_neu[:2])
             height_m = min(height_m, max(away_m * slope, climbed_m, LOWEST_RETURN_M))
-        return max(height_m, now_m)
+        return max(min(height_m, pilot.fence.highest_return_m), now_m)
 
 
 class Path:

@@ -9,6 +9,7 @@ from typing import Literal
 from planning.flight_time.scurve import Axes
 from telemetry.simulation.simulator.airframe.dynamics import GRAVITY_M_S2
 from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
+from telemetry.simulation.simulator.autopilot.copter_fence import CopterFence
 from telemetry.simulation.simulator.autopilot.leg_curves import Motion
 from telemetry.simulation.simulator.autopilot.mission_steps import MissionSteps, Step
 from telemetry.simulation.simulator.autopilot.shaping import limited
@@ -169,6 +170,7 @@ class SimulatedPilot(AnyPilot):
         self.facing_fixed = False
         """A heading was commanded: the next waypoint does not turn the vehicle."""
         self.control = PositionControl()
+        self.fence = CopterFence(parameters)
 
     def axes(self, speed_m_s: float | None = None) -> Axes:
         return replace(self.parameters.axes(speed_m_s), **self._vertical_m_s)

@@ -1,13 +1,16 @@
-"""The simulated vehicle's fence and rally points: kept and given back as ArduCopter does. It does not act on them."""
+"""The simulated vehicle's fence and rally points: kept and given back as ArduCopter does. It acts on the fence."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from planning.basics.mav_cmd import FENCE_CIRCLES, FENCE_POLYGONS, FENCES, MavCmd, MavFrame
 from telemetry.simulation.simulator.autopilot.autopilot import Autopilot
+from telemetry.simulation.simulator.autopilot.fence_shapes import FencePart
+from telemetry.simulation.simulator.neu_frame import NeuFrame
 from telemetry.simulation.simulator.protocol.item_protocol import ItemInt, Target
 
 FENCE_CAPACITY, RALLY_CAPACITY = 255, 20
@@ -57,6 +60,7 @@ class FenceStore:
             self._autopilot.say(4, "Fence refused: corners are missing, or a radius is zero")
             return wire.MAV_MISSION_ERROR
         self._kept, self._coming = self._coming, []
+        self._autopilot.fence.parts = fence_parts(self._kept, self._autopilot.frame)
         self._autopilot.parameters.set("FENCE_TOTAL", min(len(self._kept), _PARAMETER_MAX))
         return wire.MAV_MISSION_ACCEPTED
 
@@ -111,6 +115,22 @@ class RallyStore:
 
     def may_clear(self) -> bool:
         return True
+
+
+def fence_parts(items: Sequence[ItemInt], frame: NeuFrame) -> tuple[FencePart, ...]:
+    """Of whole polygons and circles; return points are left out."""
+    parts: list[FencePart] = []
+    at = 0
+    while at < len(items):
+        first = items[at]
+        run = int(first.param1) if first.command in FENCE_POLYGONS else 1
+        places = tuple(frame.neu_from_geodetic(each.x / 1e7, each.y / 1e7, 0.0)[:2] for each in items[at : at + run])
+        if first.command in FENCE_POLYGONS:
+            parts.append(FencePart(first.command == MavCmd.NAV_FENCE_POLYGON_VERTEX_INCLUSION, places))
+        elif first.command in FENCE_CIRCLES:
+            parts.append(FencePart(first.command == MavCmd.NAV_FENCE_CIRCLE_INCLUSION, places, first.param1))
+        at += max(run, 1)
+    return tuple(parts)
 
 
 def _place_refusal(item: ItemInt, commands: frozenset[MavCmd], frames: tuple[MavFrame, ...]) -> int:

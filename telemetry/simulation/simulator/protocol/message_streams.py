@@ -9,6 +9,7 @@ from pymavlink.dialects.v20.ardupilotmega import MAVLink_message
 
 from telemetry.simulation.simulator.airframe.dynamics import GRAVITY_M_S2, quaternion
 from telemetry.simulation.simulator.autopilot.autopilot import Autopilot
+from telemetry.simulation.simulator.autopilot.copter_fence import CEILING, CIRCLE, FLOOR, SHAPES
 from telemetry.simulation.simulator.autopilot.pilot import AS_REAL_BOOT_S, Event, HomeSet, Reached, StateChanged
 from telemetry.simulation.simulator.protocol.command_protocol import MODE_NUMBERS
 from telemetry.simulation.simulator.protocol.common_streams import CommonStreams
@@ -32,6 +33,13 @@ EKF_AT_BOOT, EKF_WITH_TILT, EKF_WITH_POSITION = 1024, 167, 831
 MISSION_STATES = {"not_started": 2, "active": 3, "paused": 4, "complete": 5}
 LANDED_STATES = {"ground": 1, "flight": 2, "takeoff": 3, "landing": 4}
 
+BREACHES = (
+    (CIRCLE | SHAPES, wire.FENCE_BREACH_BOUNDARY),
+    (CEILING, wire.FENCE_BREACH_MAXALT),
+    (FLOOR, wire.FENCE_BREACH_MINALT),
+)
+"""FENCE_STATUS tells one."""
+
 
 class ArduStreams(CommonStreams):
     """SIM_STATE alone tells the truth."""
@@ -50,6 +58,7 @@ class ArduStreams(CommonStreams):
             wire.MAVLINK_MSG_ID_WIND: self._wind,
             wire.MAVLINK_MSG_ID_EKF_STATUS_REPORT: self._ekf_status,
             wire.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self._extended_state,
+            wire.MAVLINK_MSG_ID_FENCE_STATUS: self._fence_status,
         }
 
     def on_event(self, event: Event) -> list[MAVLink_message]:
@@ -100,15 +109,30 @@ class ArduStreams(CommonStreams):
             healthy = HEALTHY_AT_BOOT
         if pilot.ready_to_arm:
             healthy |= wire.MAV_SYS_STATUS_PREARM_CHECK
+        enabled = SENSORS_IN_USE if pilot.mode.needs_position else SENSORS_IDLE
+        if pilot.fence.acts:
+            enabled |= wire.MAV_SYS_STATUS_GEOFENCE
+        if pilot.fence.breached:
+            healthy &= ~wire.MAV_SYS_STATUS_GEOFENCE
         return wire.MAVLink_sys_status_message(
             SENSORS_PRESENT,
-            SENSORS_IN_USE if pilot.mode.needs_position else SENSORS_IDLE,
+            enabled,
             healthy,
             0,
             round(battery.voltage_v * 1000),
             round(battery.current_a * 100),
             round(battery.share * 100),
             *[0] * 6,
+        )
+
+    def _fence_status(self) -> MAVLink_message | None:
+        """Of a fence that is switched on alone."""
+        fence = self._pilot.fence
+        if not fence.is_on:
+            return None
+        kind = next((told for kinds, told in BREACHES if fence.breached & kinds), wire.FENCE_BREACH_NONE)
+        return wire.MAVLink_fence_status_message(
+            int(fence.breached != 0), min(fence.count, 65535), kind, int(fence.breached_s * 1000)
         )
 
     def _nav_controller(self) -> MAVLink_message:

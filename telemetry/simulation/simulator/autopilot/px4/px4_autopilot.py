@@ -78,7 +78,7 @@ class Px4Pilot(Px4Flying):
 
     @property
     def failsafe_active(self) -> bool:
-        return self._gcs_lost
+        return self._gcs_lost or self.fence.acts
 
     @property
     def ready_to_arm(self) -> bool:
@@ -231,6 +231,7 @@ class Px4Pilot(Px4Flying):
         self.now_s += dt_s
         self.p_neu, self.v_neu, self.above_ground_m = sensed.p_neu, sensed.v_neu, sensed.above_ground_m
         self._boot()
+        self.keep_to_fence(self.mode.name)
         if not self.armed:
             self._face_as_it_stands(sensed)
             return None
@@ -348,7 +349,7 @@ class Px4Pilot(Px4Flying):
     def _why_not_arm(self) -> str | None:
         if self.crashed:
             return "Vehicle has crashed: start the simulation again"
-        if not self.position_ok:
+        if not self.position_ok or self.fence.is_breached:
             return "Resolve system health failures first"
         if self.mode.name in ("LAND", "RTL", *BY_HAND):
             return f"Resolve system health failures first: {self.mode.name.capitalize()} mode"

@@ -8,6 +8,7 @@ from abc import ABC, abstractmethod
 from telemetry.simulation.simulator.autopilot.autopilot_parameters import Parameters
 from telemetry.simulation.simulator.autopilot.mission_steps import MissionSteps, Step
 from telemetry.simulation.simulator.autopilot.pilot import Answer, AnyPilot
+from telemetry.simulation.simulator.autopilot.px4.px4_fence import Px4Fence
 from telemetry.simulation.simulator.autopilot.px4.trajectory import Limits, Trajectory
 from telemetry.simulation.simulator.neu_frame import NeuFrame, Vec3
 
@@ -42,10 +43,27 @@ class Px4Flying(AnyPilot, ABC):
         self.cruise_m_s: float | None = None
         """Replaces MPC_XY_CRUISE until the mode changes."""
         self.above_ground_m = 0.0
+        self.fence = Px4Fence(parameters)
 
     @abstractmethod
     def change_mode(self, name: str) -> bool:
         """By itself. Whether the mode could be had."""
+
+    @abstractmethod
+    def crash(self, reason: str) -> None:
+        """Motors off, whatever comes of it."""
+
+    def keep_to_fence(self, mode: str) -> None:
+        """``mode``: that is flown."""
+        if not self.position_ok:
+            return
+        news = self.fence.check(self.p_neu, self.home_neu, self.now_s, armed=self.armed, mode=mode)
+        for text in news.texts:
+            self.say(2, text)
+        if news.terminates:
+            self.crash("Flight termination active")
+        elif news.mode is not None and self.flying:
+            self.change_mode(news.mode)
 
     @abstractmethod
     def hold_at(self, place_neu: Vec3) -> None:

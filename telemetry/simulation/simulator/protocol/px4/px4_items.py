@@ -9,6 +9,8 @@ from pymavlink.dialects.v20 import ardupilotmega as wire
 from planning.basics.mav_cmd import FENCE_CIRCLES, FENCE_POLYGONS, FENCES, MavCmd, MavFrame
 from telemetry.simulation.simulator.autopilot.mission_steps import Step
 from telemetry.simulation.simulator.autopilot.px4.px4_autopilot import Px4Pilot
+from telemetry.simulation.simulator.autopilot.px4.px4_fence import INVALID
+from telemetry.simulation.simulator.protocol.fence_lists import fence_parts
 from telemetry.simulation.simulator.protocol.item_protocol import ItemInt
 from telemetry.simulation.simulator.protocol.kept_items import KINDS, WITHOUT_MOTION
 
@@ -65,7 +67,8 @@ class MissionItems:
 class FenceItems:
     mission_type, capacity = wire.MAV_MISSION_TYPE_FENCE, FENCE_CAPACITY
 
-    def __init__(self) -> None:
+    def __init__(self, pilot: Px4Pilot) -> None:
+        self._pilot = pilot
         self.kept: list[ItemInt] = []
 
     def refusal(self, item: ItemInt) -> int:
@@ -78,7 +81,9 @@ class FenceItems:
         return _misplaced(item)
 
     def replace(self, items: list[ItemInt]) -> int:
-        self.kept = items
+        self.kept, pilot = items, self._pilot
+        for _ in range(pilot.fence.take(fence_parts(items, pilot.frame), pilot.home_neu)):
+            pilot.say(2, INVALID)
         return ACCEPTED
 
 

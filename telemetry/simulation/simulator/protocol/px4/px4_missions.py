@@ -48,7 +48,7 @@ class _Giving:
 class Px4Missions:
     def __init__(self, pilot: Px4Pilot) -> None:
         self._pilot = pilot
-        lists: tuple[Items, ...] = (MissionItems(pilot), FenceItems(), RallyItems())
+        lists: tuple[Items, ...] = (MissionItems(pilot), FenceItems(pilot), RallyItems())
         self._lists: dict[int, Items] = {items.mission_type: items for items in lists}
         self._busy: _Taking | _Giving | None = None
         self._last_taken = -1
