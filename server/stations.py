@@ -27,6 +27,7 @@ from server.flying.parameter_desk import ParameterDesk
 from server.flying.plan_followed import PlanFollowed
 from server.flying.recordings import Recording, TrackSoFar
 from server.flying.simulation import Simulation
+from server.flying.uploading.fence_heights_desk import FenceHeights
 from server.flying.vehicle_log_desk import VehicleLogs
 from server.flying.work import FlightWork
 from server.heard.agents import Agents
@@ -165,6 +166,7 @@ class Flying:
         )
         name = "" if alone else wanted.name
         self.parameters = ParameterDesk(link, self.live, aboard, library.root, self._on_parameters, name)
+        self.heights = FenceHeights(link, self.live, aboard, lambda: self.desk.home_rises_m, self.parameters.on_written)
         self.recording = Recording(number, recordings, shared.shelf, self.nodes, present)
         self.logs = VehicleLogs(link, self.live, library, name)
         self.simulation = Simulation(

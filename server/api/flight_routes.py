@@ -9,12 +9,15 @@ from fastapi.responses import Response
 
 from server.api.access import DONE, ERROR_RESPONSES, Fly, InCharge, answer
 from server.schemas import (
+    FenceHeightsDoc,
+    FenceHeightsSet,
     FlyState,
     FlyWayBody,
     GuidedState,
     HomeBody,
     HomeState,
     ResumeFlight,
+    SetFenceHeights,
     SetHomeBody,
     StartFlight,
     TakeUpPlan,
@@ -37,6 +40,19 @@ async def upload(body: UploadPlan, operator: InCharge, flying: Fly) -> Response:
 async def check(operator: InCharge, flying: Fly) -> Response:
     """Reads the mission back and judges it where the vehicle really stands."""
     return answer(await flying.desk.check(operator))
+
+
+@router.post("/fence_heights", response_model=FenceHeightsDoc)
+async def look_at_fence_heights(operator: InCharge, flying: Fly) -> Response:
+    """What would change on the vehicle so that it keeps the floor and ceiling of the plan on board; nothing is set."""
+    del operator
+    return answer(await flying.heights.look())
+
+
+@router.post("/fence_heights/set", response_model=FenceHeightsSet)
+async def set_fence_heights(body: SetFenceHeights, operator: InCharge, flying: Fly) -> Response:
+    """Writes exactly what was shown and reads it back; 409 where it is something else by now, refused while armed."""
+    return answer(await flying.heights.set(operator, body))
 
 
 @router.post("/take_up", response_model=FlyState)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import typer
-from typer import Argument
+from typer import Argument, Option
 
 from planning.basics.plan_model import Firmware, MissionItem
 from planning.errors import FormatError, ParameterError
@@ -19,6 +19,7 @@ from planning.formats.safe_text import clean_name
 from server.cli.shared import options as o
 from server.cli.shared.command import DONE, FAILED, command
 from server.cli.shared.files_in_out import check_directory, read_small, write_files
+from server.cli.shared.heights_set import HeightsDone, read_heights, set_heights
 from server.cli.shared.output import answer, say, say_notes
 from server.cli.shared.own_nodes import OPERATOR, own_nodes
 from server.cli.shared.upload_words import report_lines, report_summary
@@ -30,6 +31,7 @@ from telemetry.topics.onboard_lists import Item, PlaceList, UploadReport
 from telemetry.topics.requests import DownloadPlaces, UploadPlaces
 
 Action = Literal["upload", "download", "clear"]
+Heights = Literal["leave", "show", "set"]
 Places = tuple[Fence, tuple[RallyPoint, ...]]
 LinkArgument = Annotated[
     str,
@@ -43,9 +45,12 @@ ActionArgument = Annotated[
 FileArgument = Annotated[
     Path | None, Argument(metavar="FILE", help="A .plan, .waypoints, .kml or .geojson file; none to clear.")
 ]
+HeightsOption = Annotated[
+    Heights,
+    Option(help="Floor and ceiling are parameters of the vehicle: show what would change, or set them too."),
+]
 _NOT_ITEMS = (
-    "floor and ceiling are no items of a fence: set them in the autopilot (ArduPilot FENCE_ALT_MIN, FENCE_ALT_MAX and"
-    " FENCE_TYPE; PX4 GF_MAX_VER_DIST)."
+    "floor and ceiling are no items of a fence: --heights set sets them on the vehicle, --heights show says how."
 )
 _ENABLED = {
     "fence": "a fence acts only if the autopilot is told so (ArduPilot FENCE_ENABLE and FENCE_ACTION; PX4 GF_ACTION).",
@@ -59,11 +64,14 @@ def fence(
     action: ActionArgument,
     file: FileArgument = None,
     *,
+    heights: HeightsOption = "leave",
     data_dir: o.Keys = None,
     as_json: o.AsJson = False,
 ) -> None:
     """Send a fence to the vehicle and read it back, save the one on board, or clear it."""
-    _run("fence", link, action, file, data_dir, as_json=as_json)
+    if heights != "leave" and action != "upload":
+        raise ParameterError(f"--heights {heights} goes with upload alone.", advice="Leave it out.")
+    _run("fence", link, action, file, data_dir, as_json=as_json, heights=heights)
 
 
 @command
@@ -80,7 +88,14 @@ def rally(
 
 
 def _run(
-    kind: PlaceList, link: str, action: Action, file: Path | None, data_dir: Path | None, *, as_json: bool
+    kind: PlaceList,
+    link: str,
+    action: Action,
+    file: Path | None,
+    data_dir: Path | None,
+    *,
+    as_json: bool,
+    heights: Heights = "leave",
 ) -> None:
     parse_addresses(link)
     job = _Job(kind, link, data_dir)
@@ -89,10 +104,26 @@ def _run(
         return
     if action == "clear" and file is not None:
         raise ParameterError("Clearing takes no file.", where=clean_name(file.name), advice="Leave the file out.")
-    places = (Fence(), ()) if action == "clear" else _read(kind, _target(file, action))
-    report = asyncio.run(job.send(places))
-    answer({"list": kind, "action": action, **report_summary(report)}, report_lines(report), as_json=as_json)
-    raise typer.Exit(DONE if report.verified else FAILED)
+    places = (Fence(), ()) if action == "clear" else _read(kind, _target(file, action), heights)
+    done = asyncio.run(job.send(places, heights))
+    summary: dict[str, Any] = {"list": kind, "action": action}
+    lines: list[str] = []
+    if done.report is not None:
+        summary |= report_summary(done.report)
+        lines += report_lines(done.report)
+    if done.heights is not None:
+        summary["heights"] = done.heights.summary
+        lines += done.heights.lines
+    answer(summary, lines, as_json=as_json)
+    verified = done.report is None or done.report.verified
+    raise typer.Exit(DONE if verified and (done.heights is None or done.heights.took) else FAILED)
+
+
+@dataclass(frozen=True, slots=True)
+class _Done:
+    report: UploadReport | None
+    """None: the fence has no shapes, and what is on board stays."""
+    heights: HeightsDone | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,11 +132,20 @@ class _Job:
     link: str
     data_dir: Path | None
 
-    async def send(self, places: Places) -> UploadReport:
+    async def send(self, places: Places, heights: Heights) -> _Done:
         async with own_nodes(recorder=False, data_dir=self.data_dir) as station, watching(station.bus) as watch:
             state = await connect(station.link, watch, self.link, OPERATOR, say)
-            items = _items(self.kind, places, "px4" if state.autopilot == "px4" else "ardupilot")
-            return await station.link.call(UploadPlaces(OPERATOR, self.kind, wire_items(items)))
+            firmware: Firmware = "px4" if state.autopilot == "px4" else "ardupilot"
+            # What cannot be set is told before anything is sent.
+            found = None if heights == "leave" else await read_heights(station.link, places[0], firmware)
+            items, report = _items(self.kind, places, firmware), None
+            if items or heights == "leave":
+                report = await station.link.call(UploadPlaces(OPERATOR, self.kind, wire_items(items)))
+            if found is None or (report is not None and not report.verified):
+                return _Done(report)
+            return _Done(
+                report, await set_heights(station.link, found, writes=heights == "set", begun=report is not None)
+            )
 
     async def read(self) -> tuple[Item, ...]:
         async with own_nodes(recorder=False, data_dir=self.data_dir) as station, watching(station.bus) as watch:
@@ -119,16 +159,20 @@ def _target(file: Path | None, action: Action) -> Path:
     return file
 
 
-def _read(kind: PlaceList, file: Path) -> Places:
+def _read(kind: PlaceList, file: Path, heights: Heights) -> Places:
     """Raises FormatError for a file that holds nothing of what is asked for: that would clear the list."""
     found = read_fence(file.name, read_small(file))
     say_notes(*found.warnings)
-    if not _items(kind, (found.fence, found.rally), "px4"):
+    sets = kind == "fence" and heights != "leave"
+    if sets and not found.fence.has_heights:
+        what = "The file's fence has neither floor nor ceiling."
+        raise FormatError(what, where=clean_name(file.name), advice="Leave --heights out, or give it one.")
+    if not _items(kind, (found.fence, found.rally), "px4") and not sets:
         what = "shapes of a fence" if kind == "fence" else "rally points"
         raise FormatError(
             f"The file holds no {what}.", where=clean_name(file.name), advice=f"To remove them, use: {kind} LINK clear"
         )
-    say_notes(_NOT_ITEMS if kind == "fence" and found.fence.has_heights else None, _ENABLED[kind])
+    say_notes(_NOT_ITEMS if kind == "fence" and found.fence.has_heights and not sets else None, _ENABLED[kind])
     return found.fence, found.rally
 
 

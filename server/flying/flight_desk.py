@@ -95,6 +95,11 @@ class FlightDesk:
             can_cancel=self._taking_up.is_computing,
         )
 
+    @property
+    def home_rises_m(self) -> float | None:
+        """The vehicle's home above the planned one, by the surface model; None: no check of the start stands."""
+        return None if self._ready is None else (self._ready.checked.doc.home_shift_m or 0.0)
+
     # What is heard
 
     def on_link(self, status: LinkStatus) -> None:

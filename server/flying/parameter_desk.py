@@ -129,19 +129,13 @@ class ParameterDesk:
             raise
         self._on_written()
         self._kept = replace(read, parameters=_after(read.parameters, written))
-        docs = [
-            WrittenDoc(
-                name=w.name,
-                asked=w.asked,
-                before=w.before,
-                after=w.after,
-                outcome=w.outcome,
-                took=w.took,
-                words=w.words,
-            )
-            for w in written
-        ]
-        return WrittenAnswer(written=docs, now=await self.doc())
+        return WrittenAnswer(written=written_docs(written), now=await self.doc())
+
+    def on_written(self, written: Sequence[ParameterWritten]) -> None:
+        """By another desk: what was read before is brought up to date."""
+        if self._kept is not None:
+            self._kept = replace(self._kept, parameters=_after(self._kept.parameters, written))
+        self._on_written()
 
     def saved(self, file: FileFormat) -> str:
         """All that was read, as a file. Raises NotReadyError."""
@@ -199,6 +193,15 @@ class ParameterDesk:
         if self._kept is None or self._kept.vehicle != self._vehicle()[0]:
             raise NotReadyError("This vehicle's parameters have not been read.", advice="Press Read.")
         return self._kept
+
+
+def written_docs(written: Sequence[ParameterWritten]) -> list[WrittenDoc]:
+    return [
+        WrittenDoc(
+            name=w.name, asked=w.asked, before=w.before, after=w.after, outcome=w.outcome, took=w.took, words=w.words
+        )
+        for w in written
+    ]
 
 
 def _after(held: dict[str, Parameter], written: Sequence[ParameterWritten]) -> dict[str, Parameter]:

@@ -8,6 +8,7 @@ import time
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 import msgspec
@@ -102,6 +103,7 @@ class Aboard:
             return OnboardDoc(state="unknown" if status is None else status.mission_state)
         if status.mission_digest != kept.record.digest:
             return OnboardDoc(state="verified", digest=status.mission_digest)
+        floor_m, ceiling_m = _heights(kept.record.plan_json)
         return OnboardDoc(
             state="verified",
             digest=kept.record.digest,
@@ -111,6 +113,8 @@ class Aboard:
             rounded=list(kept.rounded),
             rounded_note=kept.note,
             taken_up=kept.record.taken_up,
+            floor_rel_home_m=floor_m,
+            ceiling_rel_home_m=ceiling_m,
         )
 
 
@@ -128,6 +132,16 @@ def is_plan(record: PlanRecord, document: PlanDoc) -> bool:
         return _flown_part(json.loads(record.plan_json)) == _flown_part(document.model_dump(mode="json"))
     except ValueError:
         return False
+
+
+@lru_cache(maxsize=4)
+def _heights(plan_json: str) -> tuple[float | None, float | None]:
+    """Floor and ceiling above home, of the plan's fence."""
+    try:
+        fence = FenceDoc.model_validate(json.loads(plan_json).get("fence") or {})
+    except (ValueError, AttributeError):
+        return None, None
+    return fence.floor_rel_home_m, fence.ceiling_rel_home_m
 
 
 def _flown_part(document: dict[str, object]) -> dict[str, object]:

@@ -11,9 +11,11 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from server.schemas.checklist_docs import ChecklistDoc
+from server.schemas.parameter_docs import ParameterName, WrittenDoc
 from server.schemas.result_docs import ErrorDoc
 from server.schemas.strict_model import Strict
 from telemetry.topics.onboard_lists import Rounded
+from telemetry.topics.parameters import MOST_CHANGES
 
 Source = Literal["live", "replay"]
 Address = Annotated[str, Field(min_length=3, max_length=200)]
@@ -108,6 +110,39 @@ class OnboardDoc(Strict):
     """One sentence: what the vehicle rounded."""
     taken_up: bool = False
     """In flight: it begins in the air, and is no mission to start from the ground."""
+    floor_rel_home_m: float | None = None
+    """Of its plan's fence; parameters of the vehicle keep it, no list."""
+    ceiling_rel_home_m: float | None = None
+
+
+class HeightChangeDoc(Strict):
+    """A parameter that keeps a fence's floor or ceiling, or has the vehicle act on them."""
+
+    name: ParameterName
+    before: Annotated[float, Field(allow_inf_nan=False)]
+    """On the vehicle now."""
+    after: Annotated[float, Field(allow_inf_nan=False)]
+    unit: Literal["m", ""]
+
+
+class FenceHeightsDoc(Strict):
+    """What would change on the vehicle so that it keeps the floor and ceiling of the plan on board."""
+
+    changes: list[HeightChangeDoc]
+    """None: it keeps them already."""
+    notes: list[str]
+
+
+class SetFenceHeights(Strict):
+    """As they were shown: 409 where they are others by now."""
+
+    changes: Annotated[list[HeightChangeDoc], Field(min_length=1, max_length=MOST_CHANGES)]
+
+
+class FenceHeightsSet(Strict):
+    written: list[WrittenDoc]
+    took: bool
+    """The vehicle holds all of them."""
 
 
 class TakenUpDoc(Strict):

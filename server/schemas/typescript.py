@@ -55,6 +55,8 @@ ANSWERS = (
     schemas.ParametersDoc,
     schemas.WrittenAnswer,
     schemas.ComparedDoc,
+    schemas.FenceHeightsDoc,
+    schemas.FenceHeightsSet,
 )
 """Of requests, beside the stream."""
 CONSTANTS = {"CHECK_FRESH_S": flight_docs.CHECK_FRESH_S, "STALE_S": STALE_S, "LOST_S": LOST_S}

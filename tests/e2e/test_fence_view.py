@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 
 from planning.formats.fence_files import read_fence
 from tests.e2e.stations import SimulatedVehicle, Station
-from tests.e2e.steps import certified, choose, click_surface, connect, drawn, open_demo, upload
+from tests.e2e.steps import certified, choose, click_surface, connect, drawn, hold, open_demo, upload
 
 pytestmark = [pytest.mark.e2e, pytest.mark.xdist_group("real-time")]
 
@@ -102,6 +102,31 @@ def test_the_fence_goes_on_board_with_the_mission_and_the_check_has_a_row_for_it
     expect(row).to_contain_text("FENCE_ENABLE is 0")
     expect(row).to_have_attribute("data-state", "accept")
     expect(page.get_by_test_id("accept-fence")).to_be_visible()
+
+
+def test_the_plans_ceiling_is_shown_old_and_new_set_and_found_on_board(
+    station: Station, page: Page, vehicle: SimulatedVehicle
+) -> None:
+    open_demo(page, station)
+    station.change(fence={"ceiling_rel_home_m": 90})
+    certified(page)
+    connect(page, vehicle)
+    upload(page)
+    page.get_by_test_id("next-check").click()
+    row = page.get_by_test_id("check-row").and_(page.locator("[data-code=fence]"))
+    expect(row).to_contain_text("The plan's ceiling at 90 m above home is not on board.")
+    expect(row).to_have_attribute("data-state", "accept")
+    box = page.get_by_test_id("fence-heights")
+    expect(box).to_contain_text("Ceiling 90 m above home")
+    page.get_by_test_id("heights-look").click()
+    changes = page.get_by_test_id("heights-changes")
+    expect(changes).to_contain_text("FENCE_ALT_MAX100 → 90 m")
+    expect(changes).to_contain_text("FENCE_ENABLE0 → 1")
+    hold(page, "heights-set")
+    expect(page.get_by_test_id("heights-written").locator("[data-outcome=set]")).to_have_count(3)
+    page.get_by_test_id("next-check").click()
+    expect(row).to_contain_text("The plan's ceiling at 90 m above home is on board.")
+    expect(row).to_have_attribute("data-state", "good")
 
 
 def _open_section(page: Page) -> None:

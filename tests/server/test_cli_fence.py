@@ -52,6 +52,25 @@ def test_a_fence_goes_up_comes_down_and_goes_away(link: str, tmp_path: Path) -> 
     assert "The vehicle has no fence" in empty.out
 
 
+def test_floor_and_ceiling_are_shown_then_set_and_found_as_they_should_be(link: str, tmp_path: Path) -> None:
+    file = tmp_path / "heights.plan"
+    file.write_text(write_fence(file.name, Fence(floor_rel_home_m=5.0, ceiling_rel_home_m=60.0), ()))
+    shown = hedgehop("fence", link, "upload", file, "--heights", "show", "--json")
+    assert shown.code == 0, shown.err
+    assert "FENCE_ALT_MAX 100 -> 60 m" in shown.err
+    assert "FENCE_ENABLE 0 -> 1" in shown.err
+    assert (shown.json["heights"]["set"], shown.json["heights"]["written"]) == (False, [])
+    done = hedgehop("fence", link, "upload", file, "--heights", "set")
+    assert done.code == 0, done.err
+    assert "FENCE_TYPE 7 -> 9" in done.err  # as it was shown before: nothing had been written
+    assert "FLOOR AND CEILING: SET, read back" in done.out
+    again = hedgehop("fence", link, "upload", file, "--heights", "set")
+    assert (again.code, "the vehicle has them already" in again.out) == (0, True)
+    held = hedgehop("params", "get", "FENCE_*", "--link", link, "--json")
+    values = {each["name"]: each["value"] for each in held.json["parameters"]}
+    assert (values["FENCE_ALT_MAX"], values["FENCE_ALT_MIN"], values["FENCE_TYPE"]) == (60.0, 5.0, 9.0)
+
+
 def test_rally_points_go_up_in_whole_metres_and_come_down(link: str, tmp_path: Path) -> None:
     file, onboard = tmp_path / "rally.plan", tmp_path / "onboard.geojson"
     file.write_text(write_fence(file.name, Fence(), RALLY))
@@ -72,6 +91,8 @@ def test_rally_points_go_up_in_whole_metres_and_come_down(link: str, tmp_path: P
         (("fence", "tcp:127.0.0.1:1", "download", "f.csv"), "No fence is written"),
         (("fence", "tcp:127.0.0.1:1", "soar", "f.csv"), "soar"),
         (("rally", "tcp:127.0.0.1:1", "upload", "FENCE"), "holds no rally points"),
+        (("fence", "tcp:127.0.0.1:1", "upload", "FENCE", "--heights", "set"), "neither floor nor ceiling"),
+        (("fence", "tcp:127.0.0.1:1", "clear", "--heights", "set"), "goes with upload alone"),
     ],
 )
 def test_wrong_input_is_told_before_any_vehicle_is_asked(arguments: tuple[str, ...], said: str, tmp_path: Path) -> None:

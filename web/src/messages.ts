@@ -1580,6 +1580,36 @@ export interface OnboardDoc {
   rounded_note: string;
   /** In flight: it begins in the air, and is no mission to start from the ground. */
   taken_up: boolean;
+  /** Of its plan's fence; parameters of the vehicle keep it, no list. */
+  floor_rel_home_m: number | null;
+  ceiling_rel_home_m: number | null;
+}
+
+/** A parameter that keeps a fence's floor or ceiling, or has the vehicle act on them. */
+export interface HeightChangeDoc {
+  name: string;
+  /** On the vehicle now. */
+  before: number;
+  after: number;
+  unit: "m" | "";
+}
+
+/** What would change on the vehicle so that it keeps the floor and ceiling of the plan on board. */
+export interface FenceHeightsDoc {
+  /** None: it keeps them already. */
+  changes: HeightChangeDoc[];
+  notes: string[];
+}
+
+/** As they were shown: 409 where they are others by now. */
+export interface SetFenceHeights {
+  changes: HeightChangeDoc[];
+}
+
+export interface FenceHeightsSet {
+  written: WrittenDoc[];
+  /** The vehicle holds all of them. */
+  took: boolean;
 }
 
 /** A plan that was taken up in flight: it is on board, verified and certified, and flown by ``resume``. */

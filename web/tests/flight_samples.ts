@@ -75,6 +75,8 @@ export function flyState(fields: Partial<FlyState> = {}): FlyState {
       rounded: [],
       rounded_note: "",
       taken_up: false,
+      floor_rel_home_m: null,
+      ceiling_rel_home_m: null,
     },
     preflight: null,
     checklist: null,

@@ -19,6 +19,7 @@ import {
   uploadPlan,
   uploadRefusal,
 } from "../vehicle/orders";
+import { FenceHeights } from "./FenceHeights";
 
 const SUMMARIES = { unknown: "not known", none: "none", verified: "verified" } as const;
 const MOST_ROWS = 40;
@@ -197,6 +198,7 @@ export function OnboardSection() {
       <State onboard={onboard} />
       <NotThePlan onboard={onboard} />
       <FromHere onboard={onboard} />
+      <FenceHeights onboard={onboard} />
       {onboard.rounded_note && (
         <p class="hint" data-testid="rounded-note">
           {onboard.rounded_note}

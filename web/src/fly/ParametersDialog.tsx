@@ -1,6 +1,5 @@
 import { useEffect, useState } from "preact/hooks";
 import { clock } from "../format";
-import type { WrittenDoc } from "../messages";
 import { active, fleet } from "../store/fleet";
 import { adopted } from "../store/flying";
 import {
@@ -24,33 +23,7 @@ import { Icon } from "../ui/Icon";
 import { Outcome } from "../ui/Outcome";
 import { LowFlight } from "./LowFlight";
 import { ParameterList } from "./ParameterList";
-
-const OUTCOMES: Record<WrittenDoc["outcome"], string> = {
-  set: "set, read back",
-  same: "was so already",
-  adjusted: "NOT AS ASKED",
-  kept: "NOT SET",
-  refused: "NOT SET",
-  unknown: "UNKNOWN",
-  "not sent": "NOT SENT",
-};
-
-function Written() {
-  if (written.value.length === 0) return null;
-  return (
-    <ul class="written" role="status" data-testid="parameters-written">
-      {written.value.slice(0, 5).map((one) => (
-        <li key={one.name} class={one.took ? "took" : "missed"} data-outcome={one.outcome}>
-          <Icon name={one.took ? "check" : "warning"} size={16} />
-          <span>
-            <strong>{one.name}</strong> {one.before ?? "?"} → {one.asked}: {OUTCOMES[one.outcome]}
-            {!one.took && one.after !== null && <>, the vehicle holds {one.after}</>}. {one.words}
-          </span>
-        </li>
-      ))}
-    </ul>
-  );
-}
+import { WrittenList } from "./WrittenList";
 
 const fileOf = (ending: "param" | "params") =>
   `/api/parameters/file/vehicle.${ending}?vehicle=${active.value}`;
@@ -128,7 +101,7 @@ export function ParametersDialog() {
       </div>
       {doc && (
         <>
-          <Written />
+          <WrittenList written={written.value.slice(0, 5)} testid="parameters-written" />
           <Segmented
             label="Which parameters"
             testid="parameters-part"
