@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 import typer
+from pydantic import ValidationError
 from typer import Argument, Option
 
 from planning.errors import ParameterError
@@ -22,11 +23,14 @@ from planning.guided.guided_model import GoTo, GuidedWay, Look, Orbit, Rally, Ta
 from planning.missions.vehicle_profile import load_profile, path_params
 from planning.planner.request import PlanRequest, check_demands
 from planning.terrain.dsm import Dsm
+from server.cli.flights.goto_station import goto_by_station
+from server.cli.flights.station_session import station_runs
 from server.cli.shared import options as o
 from server.cli.shared.command import DONE, FAILED, Without, command
 from server.cli.shared.output import answer, end_progress, progress, say, say_notes
 from server.cli.shared.own_nodes import OPERATOR, Station, own_nodes
 from server.cli.shared.terrain_given import OpenedModel, open_model
+from server.schemas import WayBody
 from server.work.clocks import StepTimer
 from telemetry.errors import NotAllowedError, TelemetryError
 from telemetry.flight.certified_way import Flown, judged_way, nearest_rally, part_for, way_json, way_request, way_words
@@ -45,6 +49,9 @@ from telemetry.topics.vehicle import VehicleState
 Action = Literal["take-off", "to", "height", "look", "orbit", "home", "rally"]
 AT_PLACE = ("to", "look", "orbit")
 POSITION_S, LOOK_S = 30.0, 1.0
+STATION = "station"
+NOT_SEEN = "no station runs: what sensors see does not count."
+SEEN_THERE = f"a station runs here: what its sensors have seen does not count. As LINK, {STATION} asks it."
 LEFT = "nobody watches the vehicle when this command ends: its own failsafes decide what it does without a link."
 
 
@@ -65,8 +72,9 @@ def goto(
     link: Annotated[
         str,
         Argument(
-            metavar="LINK",
-            help="Connection to the vehicle: udpin:0.0.0.0:14550, tcp:10.0.0.7:5760; several with commas.",
+            metavar="LINK|station",
+            help="Connection to the vehicle: udpin:0.0.0.0:14550, tcp:10.0.0.7:5760; several with commas. station: the"
+            " ground station that runs on this computer holds it, and judges by what its sensors have seen.",
         ),
     ],
     action: Annotated[
@@ -78,7 +86,10 @@ def goto(
     ],
     place: Annotated[str | None, Argument(metavar="LAT,LON", help="For to, look and orbit.")] = None,
     *,
-    dsm: Annotated[Path, Option(metavar="FILE", help="Surface model that is flown over: GeoTIFF or ESRI ASCII grid.")],
+    dsm: Annotated[
+        Path | None, Option(metavar="FILE", help="Surface model that is flown over: GeoTIFF or ESRI ASCII grid.")
+    ] = None,
+    vehicle: Annotated[int | None, Option(help="Number of the vehicle, where a station has several.")] = None,
     check: Annotated[bool, Option("--check", help="Judge the way and say it; do not fly it.")] = False,
     accept_return: Annotated[
         bool, Option("--accept-return", help="Fly although the vehicle's own return from the way would not be clear.")
@@ -95,23 +106,40 @@ def goto(
 ) -> None:
     """Certify one way over the surface model from where the vehicle is, and fly it in GUIDED.
 
-    It is raised as far as it must be, or refused with where and by how much. What sensors see is not known here, nor
-    whether home was moved since the take-off: a receiver with fixed RTK tells, else --home-on-ground says so.
+    It is raised as far as it must be, or refused with where and by how much. Over a LINK of its own it knows neither
+    what sensors see nor whether home was moved since the take-off: a receiver with fixed RTK tells, else
+    --home-on-ground says so. The station knows both; model and vehicle are then those of its open plan.
     """
+    where = _place(action, place)
+    if link.strip().lower() == STATION:
+        _refuse_own(dsm, given, demands, how, home_on_ground=home_on_ground)
+        body = _body(action, where, wanted)
+        raise typer.Exit(
+            goto_by_station(data_dir, vehicle, body, may_fly=not check, accepts=accept_return, as_json=as_json)
+        )
     parse_addresses(link)
-    wish = _wish(action, _place(action, place), wanted)
-    vehicle = replace(load_profile(given.profile), **o.of_vehicle(given, demands))
+    if vehicle is not None:
+        raise ParameterError(
+            "A link leads to one vehicle.", where="--vehicle", advice=f"Leave it out, or name {STATION}."
+        )
+    if dsm is None:
+        raise ParameterError(
+            "A surface model is needed.", where="--dsm", advice=f"Name its file, or {STATION} as LINK."
+        )
+    say_notes(SEEN_THERE if station_runs(data_dir) else NOT_SEEN)
+    wish = _wish(action, where, wanted)
+    profile = replace(load_profile(given.profile), **o.of_vehicle(given, demands))
     request = PlanRequest(
         pois=(),
-        profile=vehicle,
-        path=path_params(vehicle),
+        profile=profile,
+        path=path_params(profile),
         required_clearance_m=demands.required_clearance_m,
         max_height_above_ground_m=demands.max_height_above_ground_m,
         way="guided",
     )
     check_demands(request)
     model = open_model(dsm, StepTimer(progress), how)
-    speed_m_s = vehicle.mean_speed_m_s if wanted.speed_m_s is None else wanted.speed_m_s
+    speed_m_s = profile.mean_speed_m_s if wanted.speed_m_s is None else wanted.speed_m_s
     flier = _Flier(link, wish, request, model, speed_m_s, data_dir, may_fly=not check, accepts=accept_return)
     flier.home_on_ground = home_on_ground
     way, flight = asyncio.run(flier.run())
@@ -121,6 +149,50 @@ def goto(
     lines += [f"  - {reason.text}" for reason in way.certificate.reasons]
     answer({"action": action, "flown": flown, "text": text, **way_json(way)}, lines, as_json=as_json)
     raise typer.Exit(DONE if flown or (check and way.problem is None) else FAILED)
+
+
+def _refuse_own(
+    dsm: Path | None,
+    given: o.PlannedVehicle,
+    demands: o.PlannedClearance,
+    how: o.ModelOptions,
+    *,
+    home_on_ground: bool,
+) -> None:
+    """Of options that the station answers itself. Raises ParameterError."""
+    named = [
+        name
+        for name, is_given in (
+            ("--dsm", dsm is not None),
+            ("--home-on-ground", home_on_ground),
+            ("those of the vehicle", given != o.PlannedVehicle()),
+            ("those of clearance", demands != o.PlannedClearance()),
+            ("those of the surface model", how != o.ModelOptions()),
+        )
+        if is_given
+    ]
+    if named:
+        what = f"The station judges by its open plan: {', '.join(named)} would not count."
+        raise ParameterError(what, where=STATION, advice="Leave them out, or change the plan in the console.")
+
+
+def _body(action: Action, place: tuple[float, float] | None, wanted: GotoOptions) -> WayBody:
+    """Raises ParameterError."""
+    asked: dict[str, Any] = {
+        "action": "take_off" if action == "take-off" else action,
+        "place": None if place is None else {"lat_deg": place[0], "lon_deg": place[1]},
+        "height_m": wanted.height_m,
+        "radius_m": wanted.radius_m,
+        "laps": wanted.laps,
+        "clockwise": not wanted.counter_clockwise,
+        "speed_m_s": wanted.speed_m_s,
+    }
+    try:
+        return WayBody.model_validate(asked)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = "--" + str(first["loc"][0]).replace("_", "-")
+        raise ParameterError(f"{first['msg']}.", where=where, advice="Give another value.") from None
 
 
 def _place(action: Action, text: str | None) -> tuple[float, float] | None:

@@ -52,7 +52,7 @@ def home(
                 is_set = True
         finally:
             if not is_set:
-                _put_away(station)
+                station.put_away("/api/flight/home")
     if refusal is not None and not check:
         say_notes(refusal)
     answer({"set": is_set, **_summary(asked)}, _lines(asked, is_set=is_set), as_json=as_json)
@@ -73,14 +73,6 @@ def _set(station: StationSession, asked: HomeAskedDoc) -> None:
     progress("Setting home", None)
     station.ask("POST", "/api/flight/home/set", {"id": asked.id}, within_s=SET_WITHIN_S, doing="Setting home")
     end_progress()
-
-
-def _put_away(station: StationSession) -> None:
-    """Or somebody else sets what nobody wants any more. That it fails is said, and hides no other error."""
-    try:
-        station.ask("DELETE", "/api/flight/home", doing="Putting away what was judged")
-    except StationError as error:
-        say_notes(f"what was judged may still stand in the console: {error.what}")
 
 
 def _why_not(ret: ReturnDoc | None, *, accepts: bool) -> str | None:

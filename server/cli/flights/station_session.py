@@ -83,6 +83,14 @@ class StationSession:
             what = f"{lease.holder or was} is in charge of the vehicle and has not handed control over."
             raise StationError(what, where=self._origin, advice=f"{NOT_IN_CHARGE} Agree with them, then try again.")
 
+    def put_away(self, path: str) -> None:
+        """What was judged there, or somebody else sets or flies what nobody wants any more. That it fails is said, and
+        hides no other error."""
+        try:
+            self.ask("DELETE", path, doing="Putting away what was judged")
+        except StationError as error:
+            say_notes(f"what was judged may still stand in the console: {error.what}")
+
     def end(self) -> None:
         """Signs out, which lets go of the vehicle; that it fails is said, and raises nothing."""
         if not self._cookie:
@@ -136,13 +144,25 @@ def station_session(data_dir: Path | None, vehicle: int | None) -> Iterator[Stat
         session.end()
 
 
-def _check_runs(data_dir: Path) -> None:
+def station_runs(data_dir: Path | None) -> bool:
+    """From ``data_dir`` (None: the settings')."""
+    return _is_held(load_settings(data_dir=data_dir).data_dir)
+
+
+def _is_held(data_dir: Path) -> bool:
     """Whoever serves from a data directory holds its lock."""
-    if data_dir.is_dir():
-        try:
-            DirectoryLock(data_dir).release()
-        except DataDirError:
-            return
+    if not data_dir.is_dir():
+        return False
+    try:
+        DirectoryLock(data_dir).release()
+    except DataDirError:
+        return True
+    return False
+
+
+def _check_runs(data_dir: Path) -> None:
+    if _is_held(data_dir):
+        return
     advice = "Start hedgehop serve, or name the data directory that it was started with: --data-dir."
     raise BadRequestError("No Hedgehop runs from this data directory.", where=str(data_dir), advice=advice)
 
