@@ -82,6 +82,13 @@ def heights_aboard(parameters: Mapping[str, float | None], firmware: Firmware) -
     )
 
 
+def are_heights_told(parameters: Mapping[str, float | None], firmware: Firmware) -> bool:
+    """Whether what the vehicle says tells at which floor and ceiling it acts, or that it acts at none."""
+    on = is_switched_on(parameters, firmware)
+    names = ("GF_MAX_VER_DIST",) if firmware == "px4" else ("FENCE_TYPE", "FENCE_ALT_MAX", "FENCE_ALT_MIN")
+    return on is False or (on is True and all(parameters.get(name) is not None for name in names))
+
+
 def highest_return_m(parameters: Mapping[str, float | None], firmware: Firmware) -> float:
     """Above home: ArduPilot lowers its return to its ceiling less its margin, without a word; inf: nothing does."""
     top_m = heights_aboard(parameters, firmware).ceiling_rel_home_m

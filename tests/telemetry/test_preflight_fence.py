@@ -86,6 +86,7 @@ KEPT = ACTS | {"FENCE_TYPE": 15.0, "FENCE_ALT_MAX": 60.0, "FENCE_ALT_MIN": 5.0}
         ({"FENCE_ENABLE": 0.0}, "accept", "The plan's ceiling at 60 m above home is not on board."),
         ({"FENCE_ENABLE": 0.0, "FENCE_AUTOENABLE": 3.0}, "good", "The plan's ceiling at 60 m above home is on board."),
         ({"FENCE_ENABLE": None}, "accept", "may not be on board: that was not read"),
+        ({"FENCE_TYPE": None}, "accept", "may not be on board: that was not read"),
     ],
 )
 def test_floor_and_ceiling_are_compared_with_what_the_vehicle_acts_at(changed, state, said) -> None:

@@ -9,8 +9,8 @@ from planning.basics.plan_model import Firmware, MissionItem
 from planning.errors import FormatError
 from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint, fence_words, within_both
 from planning.formats.fence_items import fence_items, fence_of, rally_items, rally_of
-from telemetry.flight.fence_actions import at_fence, deaf_to_shapes, is_switched_on
-from telemetry.flight.fence_heights import NO_FLOOR, SAME_M, heights_aboard
+from telemetry.flight.fence_actions import at_fence, deaf_to_shapes
+from telemetry.flight.fence_heights import NO_FLOOR, SAME_M, are_heights_told, heights_aboard
 from telemetry.flight.preflight.checks import Row
 from telemetry.mavlink.items import mission_items, wire_items
 from telemetry.mavlink.verify import compare
@@ -85,7 +85,7 @@ class _Heights:
 
 
 def _heights(planned: Fence, parameters: Mapping[str, float | None], firmware: Firmware) -> _Heights:
-    own, known = heights_aboard(parameters, firmware), is_switched_on(parameters, firmware) is not None
+    own, known = heights_aboard(parameters, firmware), are_heights_told(parameters, firmware)
     words: list[str] = []
     mend = ""
     for name, wanted_m, own_m, stricter in (
