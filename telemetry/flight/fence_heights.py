@@ -35,6 +35,8 @@ MARGIN_M, DEEPEST_M = 2.0, -100.0
 """ArduPilot's own margin where it does not tell it, and the lowest FENCE_ALT_MIN with which it arms."""
 HOLD = 2.0
 """GF_ACTION, as PX4 comes."""
+SAME_HOME_M = 0.3
+"""A home that lies so near to the planned one's height is that one: the plan's heights are not moved for it either."""
 SAME_M = 0.005
 """Single precision, as vehicles keep it, differs by less."""
 NO_FLOOR = "PX4 has no floor: the vehicle knows nothing of the plan's."
@@ -106,10 +108,11 @@ def height_changes(
     Raises NotAllowedError where the vehicle cannot have them, or would not arm with them.
     """
     floor_m, ceiling_m = fence.floor_rel_home_m, fence.ceiling_rel_home_m
+    rises_m = home_rises_m if abs(home_rises_m) > SAME_HOME_M else 0.0
     if floor_m is not None:
-        floor_m = math.ceil(round(100 * (floor_m + max(0.0, -home_rises_m)), 3)) / 100
+        floor_m = math.ceil(round(100 * (floor_m + max(0.0, -rises_m)), 3)) / 100
     if ceiling_m is not None:
-        ceiling_m = math.floor(round(100 * (ceiling_m - max(0.0, home_rises_m)), 3)) / 100
+        ceiling_m = math.floor(round(100 * (ceiling_m - max(0.0, rises_m)), 3)) / 100
     if floor_m is None and ceiling_m is None:
         raise NotAllowedError("The fence has neither floor nor ceiling.", advice="Give it one under Fence in Plan.")
     if ceiling_m is not None and ceiling_m <= 0:
