@@ -52,6 +52,7 @@ export function FenceHeights({ onboard }: { onboard: OnboardDoc }) {
   if (onboard.state !== "verified" || words === null) return null;
   const doc = heights.value;
   const why = whyNotWrite.value;
+  const isBusy = pending.value.has(HEIGHTS);
   return (
     <div
       class="callout fence-heights"
@@ -65,11 +66,11 @@ export function FenceHeights({ onboard }: { onboard: OnboardDoc }) {
       <div class="row wrap">
         <Button
           testid="heights-look"
-          disabled={why !== null || pending.value.has(HEIGHTS)}
+          disabled={why !== null || isBusy}
           title={why ?? "Reads the vehicle's settings; nothing is written"}
           onClick={() => void lookAtHeights()}
         >
-          {doc ? "Compare again" : "Compare with the vehicle"}
+          {isBusy ? "Asking the vehicle…" : doc ? "Compare again" : "Compare with the vehicle"}
         </Button>
         {doc && doc.changes.length > 0 && (
           <HoldButton
