@@ -16,6 +16,7 @@ TelemetryError
 ├── SensorError            a sensor's port that is gone, busy or silent; a configuration that the sensor refuses
 ├── Ros2Error              a router of ROS 2 that does not answer; topics or frames that are missing
 │   └── Ros2AddressError       a router that Hedgehop would not reach
+├── StationsError          another station's message, name or router that is not accepted
 └── BusError               a node that is not there, or messages nobody understands
 """
 
@@ -88,6 +89,10 @@ class Ros2Error(TelemetryError):
 
 class Ros2AddressError(Ros2Error, AddressError):
     code = "ros2_address"
+
+
+class StationsError(TelemetryError):
+    code = "stations"
 
 
 class BusError(TelemetryError):

@@ -77,7 +77,11 @@ def test_the_raster_module_may_open_rasters(small_house: Path) -> None:
         ("planning/terrain/dsm.py", "import rasterio.windows", "Only the raster modules open rasters"),
         ("telemetry/bus/bus.py", "from pydantic import BaseModel", "Only the server knows the web frameworks"),
         ("server/app.py", "import pymavlink.mavutil", "Only telemetry knows the wire protocols and the bus"),
-        ("telemetry/link/link.py", "import zenoh", "Only the bus and the wire to ROS 2 know Zenoh"),
+        (
+            "telemetry/link/link.py",
+            "import zenoh",
+            "Only the bus and the wires to ROS 2 and to other stations know Zenoh",
+        ),
         (
             "planning/certificate/clearance.py",
             "import planning.safe_surface",

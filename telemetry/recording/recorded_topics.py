@@ -16,8 +16,8 @@ BULKY = MAPS | {Topic.CLOUD_FRAME, Topic.CLOUD_LOOK}
 NOT_REPLAYED = FRAMES | {Topic.RAW, Topic.SERVER, Topic.TRUTH}
 """Frames are for other programs, a replay is no sign of life of a server, truth is for simulated sensors."""
 
-NOT_RECORDED = frozenset({Topic.RECORDER, Topic.REPLAY})
-"""What recorder and replay say of themselves."""
+NOT_RECORDED = frozenset({Topic.RECORDER, Topic.REPLAY, Topic.STATIONS_OWN, Topic.STATIONS})
+"""What recorder and replay say of themselves; vehicles of other stations are recorded there."""
 
 EVENTS = frozenset({Topic.TEXT, Topic.RAW, Topic.COMMAND, Topic.SERVER, Topic.ALERT}) | MAPS | FRAMES
 """Topics of which each message counts; of all others the latest is the state of things."""

@@ -22,6 +22,7 @@ from telemetry.topics.obstacles import (
     PerceptionSettings,
     PerceptionStatus,
 )
+from telemetry.topics.stations import OwnVehicles, StationsStatus
 from telemetry.topics.tracks import TracksStatus
 from telemetry.topics.traffic import TrafficSettings, TrafficStatus
 from telemetry.topics.vehicle import SimTruth, VehicleState
@@ -64,6 +65,8 @@ class Topic(StrEnum):
     TRACKS = "tracks/status"  # TracksStatus, latest wins
     TRAFFIC = "traffic/status"  # TrafficStatus, latest wins
     TRAFFIC_SETTINGS = "traffic/settings"  # TrafficSettings, latest wins
+    STATIONS_OWN = "stations/own"  # OwnVehicles, latest wins
+    STATIONS = "stations/status"  # StationsStatus, latest wins
     AVOIDANCE = "avoidance/status"  # AvoidanceStatus, latest wins
     TRUTH = "simulator/truth"  # SimTruth, latest wins, 50 Hz
     SERVER = "server/alive"  # ServerAlive, at 1 Hz: what keeps the link node's heartbeat going
@@ -338,6 +341,8 @@ Published = (
     | TracksStatus
     | TrafficStatus
     | TrafficSettings
+    | OwnVehicles
+    | StationsStatus
     | AvoidanceStatus
     | SimTruth
 )
@@ -376,6 +381,8 @@ MESSAGE_TYPES: dict[str, type[Published]] = {
     Topic.TRACKS: TracksStatus,
     Topic.TRAFFIC: TrafficStatus,
     Topic.TRAFFIC_SETTINGS: TrafficSettings,
+    Topic.STATIONS_OWN: OwnVehicles,
+    Topic.STATIONS: StationsStatus,
     Topic.AVOIDANCE: AvoidanceStatus,
     Topic.TRUTH: SimTruth,
 }

@@ -1,0 +1,1 @@
+"""Several stations that see each other's vehicles through a Zenoh router: read only, no command crosses."""
