@@ -1,0 +1,94 @@
+"""What other stations have told: nothing repeated, nothing mixed up, nothing without bounds, each at its age."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+from telemetry.errors import StationsError
+from telemetry.stations.keys import MOST_STATIONS, Key, read_key
+from telemetry.stations.other import LOST_S, Other
+from telemetry.stations.summary import BEACON_BYTES, VEHICLE_BYTES, BeaconWire, VehicleWire, decode
+from telemetry.topics.stations import OtherStation, OtherVehicle
+
+FORGOTTEN_S = 3600.0
+"""A station that was not heard for so long is no longer told of."""
+_BEACONS_KEPT = 128
+_NAMESAKE_S = 30.0
+
+
+class Roster:
+    """Sans-IO. ``own``: this station's name; ``run``: of this process."""
+
+    def __init__(self, own: str, run: int) -> None:
+        self._own, self._run = own, run
+        self._others: dict[str, Other] = {}
+        self._beacons = 0
+        self._sent_us: deque[int] = deque(maxlen=_BEACONS_KEPT)
+        self._namesake_s = -math.inf
+        self.refused, self.refused_last = 0, ""
+
+    def on_message(self, key: str, payload: bytes, *, now_s: float, now_utc_s: float) -> None:
+        """What is refused is counted, with the reason of the last one."""
+        try:
+            self._take(key, payload, now_s, now_utc_s)
+        except StationsError as error:
+            self.refuse(error.what)
+
+    def refuse(self, why: str, times: int = 1) -> None:
+        self.refused += times
+        self.refused_last = why
+
+    def beacon(self, vehicles: int, *, now_s: float, now_utc_s: float) -> BeaconWire:
+        self._beacons += 1
+        sent_us = round(now_s * 1e6)
+        self._sent_us.append(sent_us)
+        heard = [back for other in self._others.values() if (back := other.newest(now_s)) is not None]
+        utc_ms = max(0, round(now_utc_s * 1000))
+        return BeaconWire(self._run, self._beacons, sent_us, utc_ms, min(vehicles, 999), tuple(heard))
+
+    def stations(self, now_s: float, now_utc_s: float) -> tuple[OtherStation, ...]:
+        for name in [name for name, other in self._others.items() if now_s - other.heard_s > FORGOTTEN_S]:
+            del self._others[name]
+        return tuple(self._others[name].told(now_s, now_utc_s) for name in sorted(self._others))
+
+    def vehicles(self, now_s: float) -> tuple[OtherVehicle, ...]:
+        return tuple(each for name in sorted(self._others) for each in self._others[name].vehicles(now_s))
+
+    def has_namesake(self, now_s: float) -> bool:
+        """Another process has lately told something under this station's name."""
+        return now_s - self._namesake_s < _NAMESAKE_S
+
+    def _take(self, text: str, payload: bytes, now_s: float, now_utc_s: float) -> None:
+        key = read_key(text)
+        if key is None:
+            raise StationsError("A message came under a name that no station uses.")
+        message: VehicleWire | BeaconWire
+        if key.vehicle is None:
+            message = decode(payload, BeaconWire, BEACON_BYTES)
+        else:
+            message = decode(payload, VehicleWire, VEHICLE_BYTES)
+        if key.station == self._own:
+            if message.run != self._run:
+                self._namesake_s = now_s
+                raise StationsError(f"A message came from another station that calls itself {self._own}, too.")
+            return
+        other = self._others.get(key.station) or self._admitted(key, now_s)
+        other.on_run(message.run, now_s)
+        if isinstance(message, VehicleWire):
+            other.on_vehicle(key.vehicle or 0, message, now_s, now_utc_s)
+        else:
+            back = next((heard for heard in message.heard if heard.station == self._own), None)
+            mine = back is not None and back.run == self._run
+            if back is not None and mine and back.sent_us not in self._sent_us:
+                raise StationsError(f"{key.station} answers what this station has not said lately.")
+            other.on_beacon(message, back if mine else None, now_s, now_utc_s)
+
+    def _admitted(self, key: Key, now_s: float) -> Other:
+        if len(self._others) >= MOST_STATIONS:
+            longest = max(self._others, key=lambda name: now_s - self._others[name].heard_s)
+            if now_s - self._others[longest].heard_s < LOST_S:
+                raise StationsError(f"{key.station} is one station more than the {MOST_STATIONS} that are kept.")
+            del self._others[longest]
+        other = self._others[key.station] = Other(key.station, now_s)
+        return other
