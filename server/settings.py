@@ -16,6 +16,8 @@ from pydantic_settings import (
 )
 
 from server.errors import StartError, error_doc
+from telemetry.errors import StationsError
+from telemetry.stations.keys import router_endpoint
 from telemetry.topics.vehicle import RadarKind
 
 GIB = 1024**3
@@ -64,6 +66,18 @@ Vehicles = Annotated[
     BeforeValidator(_split_vehicles),
     AfterValidator(_checked_vehicles),
     Field(max_length=MOST_VEHICLES),
+]
+
+
+def _checked_routers(value: tuple[str, ...]) -> tuple[str, ...]:
+    try:
+        return tuple(router_endpoint(text) for text in value)
+    except StationsError as error:
+        raise ValueError(f"{error.what} {error.advice}") from error
+
+
+Routers = Annotated[
+    tuple[str, ...], NoDecode, BeforeValidator(_split), AfterValidator(_checked_routers), Field(max_length=8)
 ]
 
 
@@ -122,6 +136,11 @@ class Settings(BaseSettings):
     vehicle: Vehicles = ()
     """Several vehicles, each with its name and its connections, separated by semicolons: Bee=udpin:0.0.0.0:14550;
     Wasp=udpin:0.0.0.0:14560. What link names is the first vehicle then, and these come after it."""
+    stations_router: Routers = ()
+    """The router at which several stations see each other's vehicles: HOST or HOST:PORT, several separated by commas
+    (the first that answers is used). Goes with stations_file; without both no station is told or heard of."""
+    stations_file: Path | None = None
+    """This station's key and certificates, which hedgehop stations makes: they also say its name."""
     demo_vehicles: Annotated[int, Field(ge=1, le=MOST_VEHICLES)] = 1
     """How many simulated vehicles the demo has. Only the first one has sensors."""
     demo_autopilots: DemoAutopilots = ()
@@ -148,6 +167,12 @@ class Settings(BaseSettings):
             raise ValueError(f"{wanted[0][0]} is the name of the one that link names: give the other one another name.")
         if twice := set(self.link) & {link for text in self.vehicle for link in named_links(text)[1]}:
             raise ValueError(f"{sorted(twice)[0]} is a connection of two vehicles.")
+        return self
+
+    @model_validator(mode="after")
+    def _check_stations(self) -> Self:
+        if bool(self.stations_router) != (self.stations_file is not None):
+            raise ValueError("stations_router and stations_file belong together: set both, or neither.")
         return self
 
     def demo_autopilot(self, index: int) -> DemoAutopilot:
@@ -263,6 +288,8 @@ _DOCUMENTED = {
     "tls_key": "none",
     "link": "none",
     "vehicle": "none",
+    "stations_router": "none",
+    "stations_file": "none",
     "demo_autopilots": "none",
     "allowed_hosts": "none",
     "allowed_origins": "none",

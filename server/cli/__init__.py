@@ -60,6 +60,7 @@ class _Commands(_Lazy):
     places: ClassVar = {
         "serve": (".serve_command.serve", examples.SERVE),
         "tls": (".door.tls_command.tls", examples.TLS),
+        "stations": (".door.stations_command.stations", examples.STATIONS),
         "plan": (".plan_command.plan", examples.PLAN),
         "certify": (".certify_command.certify", examples.CERTIFY),
         "survey": (".survey_command.survey", examples.SURVEY),

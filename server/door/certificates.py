@@ -64,8 +64,10 @@ class Certificate:
 
     def is_due(self, wanted: Names, now_utc: datetime) -> bool:
         """Whether it has to be made anew; addresses that are gone for now may come back."""
-        lasts = self.since_utc <= now_utc < self.until_utc - RENEWED_BEFORE
-        return not (lasts and self.names.holds(wanted))
+        return self.ends_soon(now_utc) or not self.names.holds(wanted)
+
+    def ends_soon(self, now_utc: datetime) -> bool:
+        return not self.since_utc <= now_utc < self.until_utc - RENEWED_BEFORE
 
 
 class CertificateFiles:
@@ -92,11 +94,25 @@ class CertificateFiles:
         wanted = (machine or names_of_machine()).with_given(self._given_names())
         if self.exist() and not self.certificate().is_due(wanted, now_utc):
             return False
+        authority = self._authority_now(now_utc)
+        write_atomically(self.server, b"".join(_new_certificate(wanted, self._load_key(), authority, now_utc)))
+        return True
+
+    def issue(self, common_name: str, now_utc: datetime, names: Names | None = None) -> tuple[bytes, bytes]:
+        """Key, and certificate with the authority's, as PEM: of a server under ``names``, else of a client.
+
+        Makes the authority if there is none. Raises CertificateError, StorageError.
+        """
+        authority = self._authority_now(now_utc)
+        return _new_certificate(names, self._load_key(), authority, now_utc, common_name)
+
+    def _authority_now(self, now_utc: datetime) -> x509.Certificate:
+        """Made if there is none. Raises CertificateError when it has ended, or ends soon."""
         if not self._authority_key.is_file():
             self._make_folder()
-            key, authority = _new_authority(now_utc)
+            key, made = _new_authority(now_utc)
             write_atomically(self._authority_key, _key_pem(key))
-            write_atomically(self.authority, _pem(authority))
+            write_atomically(self.authority, _pem(made))
         authority = self._load_authority()
         if not authority.not_valid_before_utc <= now_utc < authority.not_valid_after_utc - RENEWED_BEFORE:
             raise CertificateError(
@@ -105,8 +121,7 @@ class CertificateFiles:
                 where=str(self.authority),
                 advice=f"Set the clock; or remove {self.folder}, run hedgehop tls, and let all devices trust it anew.",
             )
-        write_atomically(self.server, _new_certificate(wanted, self._load_key(), authority, now_utc))
-        return True
+        return authority
 
     def certificate(self) -> Certificate:
         """Raises CertificateError when it cannot be read."""
@@ -156,6 +171,14 @@ def read_certificate(path: Path) -> Certificate:
         dns = addresses = frozenset[str]()
     own = frozenset(address for address in addresses if isinstance(address, Address))
     return Certificate(Names(dns, own), certificate.not_valid_before_utc, certificate.not_valid_after_utc)
+
+
+def read_common_name(path: Path) -> str:
+    """Of the first certificate in a PEM file. Raises CertificateError."""
+    from cryptography.x509.oid import NameOID
+
+    found = _first_certificate(path).subject.get_attributes_for_oid(NameOID.COMMON_NAME)
+    return str(found[0].value) if len(found) == 1 else ""
 
 
 def names_of_machine() -> Names:
@@ -229,36 +252,43 @@ def _new_authority(now_utc: datetime) -> tuple[EllipticCurvePrivateKey, x509.Cer
 
 
 def _new_certificate(
-    names: Names, authority_key: EllipticCurvePrivateKey, authority: x509.Certificate, now_utc: datetime
-) -> bytes:
-    """Its key, itself and the authority, as PEM."""
+    names: Names | None,
+    authority_key: EllipticCurvePrivateKey,
+    authority: x509.Certificate,
+    now_utc: datetime,
+    common_name: str = "Hedgehop",
+) -> tuple[bytes, bytes]:
+    """Its key; itself and the authority, as PEM. Without names it is a client's, and no server can show it."""
     from cryptography import x509
     from cryptography.hazmat.primitives import hashes
     from cryptography.hazmat.primitives.asymmetric import ec
     from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
     key = ec.generate_private_key(ec.SECP256R1())
-    alternatives = [x509.DNSName(name) for name in sorted(names.dns)]
-    alternatives += [x509.IPAddress(address) for address in sorted(names.addresses, key=str)]
     usage = x509.KeyUsage(True, False, False, False, False, False, False, False, False)
     above = x509.AuthorityKeyIdentifier.from_issuer_public_key(authority_key.public_key())
-    certificate = (
+    builder = (
         x509.CertificateBuilder(
             authority.subject,
-            x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, "Hedgehop")]),
+            x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common_name)]),
             key.public_key(),
             x509.random_serial_number(),
         )
         .not_valid_before(now_utc - _CLOCKS_DIFFER_BY)
         .not_valid_after(min(now_utc + CERTIFICATE_LASTS - _CLOCKS_DIFFER_BY, authority.not_valid_after_utc))
-        .add_extension(x509.SubjectAlternativeName(alternatives), critical=False)
         .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
         .add_extension(usage, critical=True)
-        .add_extension(x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH]), critical=False)
         .add_extension(above, critical=False)
-        .sign(authority_key, hashes.SHA256())
     )
-    return _key_pem(key) + _pem(certificate) + _pem(authority)
+    purpose = ExtendedKeyUsageOID.CLIENT_AUTH
+    if names is not None:
+        purpose = ExtendedKeyUsageOID.SERVER_AUTH
+        alternatives = [x509.DNSName(name) for name in sorted(names.dns)]
+        alternatives += [x509.IPAddress(address) for address in sorted(names.addresses, key=str)]
+        builder = builder.add_extension(x509.SubjectAlternativeName(alternatives), critical=False)
+    builder = builder.add_extension(x509.ExtendedKeyUsage([purpose]), critical=False)
+    certificate = builder.sign(authority_key, hashes.SHA256())
+    return _key_pem(key), _pem(certificate) + _pem(authority)
 
 
 def _key_pem(key: EllipticCurvePrivateKey) -> bytes:

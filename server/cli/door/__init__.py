@@ -1,1 +1,1 @@
-"""``hedgehop account`` and ``hedgehop tls``: who may come in, and how other devices know this station."""
+"""``hedgehop account``, ``tls`` and ``stations``: who may come in, and how others know this station."""

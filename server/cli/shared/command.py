@@ -21,7 +21,7 @@ from typer.models import OptionInfo
 from planning.errors import DescribedError
 from server.cli.shared.output import end_progress, print_json, say
 from server.errors import StationError
-from telemetry.errors import AddressError, RecordingError, TelemetryError
+from telemetry.errors import AddressError, RecordingError, StationsError, TelemetryError
 
 DONE, FAILED, WRONG_INPUT = 0, 1, 2
 
@@ -106,7 +106,9 @@ def refusing(*, as_json: bool) -> Iterator[None]:
         raise
     except DescribedError as error:
         _answer_error(error.code, error.what, error.where, error.advice, as_json=as_json)
-        in_flight = isinstance(error, TelemetryError) and not isinstance(error, AddressError | RecordingError)
+        in_flight = isinstance(error, TelemetryError) and not isinstance(
+            error, AddressError | RecordingError | StationsError
+        )
         raise typer.Exit(FAILED if in_flight or isinstance(error, StationError) else WRONG_INPUT) from None
     except OSError as error:
         what = f"{error.strerror or error}."

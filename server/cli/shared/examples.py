@@ -23,6 +23,10 @@ TLS = _examples(
     ("Also reached under another name and address", "hedgehop tls --name gcs.example --name 192.168.1.20"),
     ("Then", "hedgehop serve --host 0.0.0.0"),
 )
+STATIONS = _examples(
+    ("Two stations and a router", "hedgehop stations router.example --station Alpha --station Bravo --out fleet"),
+    ("A third one later", "hedgehop stations router.example --station Charlie --out fleet"),
+)
 AUDIT = _examples(
     ("Is the log of commands whole", "hedgehop audit ~/.local/share/hedgehop"),
     ("As a table too", "hedgehop audit ~/.local/share/hedgehop --csv commands.csv"),

@@ -1,0 +1,93 @@
+"""Files with which stations meet at a router: ``NAME.pem`` for each station, ``router.json5`` for the router.
+
+All are signed by this machine's own authority (``server/door/certificates.py``); its key never leaves this machine. A
+station's certificate is good for showing who it is and for nothing else: no browser takes it for a site's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from planning.errors import DescribedError
+from server.door.certificates import CertificateFiles, Names, read_certificate, read_common_name
+from server.errors import StartError
+from server.library.whole_files import storage_errors, write_atomically
+from telemetry.errors import StationsError
+from telemetry.stations.keys import ROUTER_PORT, checked_name
+from telemetry.stations.router_file import router_file
+
+ROUTER_FILE, _SUFFIX = "router.json5", ".pem"
+_BEGIN = "-----BEGIN "
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    made: list[Path]
+    kept: list[Path]
+
+
+def write_station_files(
+    out: Path,
+    authority: CertificateFiles,
+    names: Sequence[str],
+    hosts: Sequence[str],
+    now_utc: datetime,
+    *,
+    listen: Sequence[str] = (f"tls/[::]:{ROUTER_PORT}",),
+) -> Written:
+    """For these stations and those whose files are there already; the router's file is written anew for all of them.
+
+    ``hosts``: under which names or addresses the router is met. Raises StationsError, CertificateError, StorageError.
+    """
+    reached = Names(frozenset(), frozenset()).with_given(list(hosts))
+    with storage_errors(out):
+        out.mkdir(mode=0o700, parents=True, exist_ok=True)
+        there = sorted(path.stem for path in out.glob(f"*{_SUFFIX}"))
+    made, kept = list[Path](), list[Path]()
+    every = sorted({checked_name(name) for name in [*names, *there]})
+    folded = {name.casefold() for name in every}
+    if len(folded) < len(every):
+        raise StationsError(
+            "Two of the stations' names differ in capitals only.", where=", ".join(every), advice="Rename one of them."
+        )
+    for name in every:
+        path = out / f"{name}{_SUFFIX}"
+        if name in there and not read_certificate(path).ends_soon(now_utc):
+            kept.append(path)
+            continue
+        key, chain = authority.issue(name, now_utc)
+        write_atomically(path, key + chain)
+        made.append(path)
+    key, chain = authority.issue("Hedgehop router", now_utc, reached)
+    leaf, above = _parts(chain.decode())
+    text = router_file(
+        every,
+        authority_pem=above.encode(),
+        certificate_pem=leaf.encode(),
+        key_pem=key,
+        listen=listen,
+    )
+    write_atomically(out / ROUTER_FILE, text.encode())
+    return Written([*made, out / ROUTER_FILE], kept)
+
+
+def station_of(path: Path) -> str:
+    """The name in a station's file. Raises StartError."""
+    try:
+        if len(_parts(path.read_text(encoding="ascii"))) != 3:
+            raise StationsError("It must hold a key, the station's certificate and the authority's.")
+        return checked_name(read_common_name(path))
+    except (OSError, UnicodeDecodeError, DescribedError) as error:
+        why = error.what if isinstance(error, DescribedError) else str(error)
+        raise StartError(
+            f"The station's file cannot be used: {why}",
+            where=f"{path} (setting stations_file)",
+            advice="Make it with hedgehop stations, and name it as a path that this user may read.",
+        ) from error
+
+
+def _parts(pem: str) -> list[str]:
+    return [_BEGIN + part for part in pem.split(_BEGIN)[1:]]
