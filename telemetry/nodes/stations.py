@@ -1,0 +1,166 @@
+"""The stations node: tells other stations of this one's vehicles, and hears of theirs, through a Zenoh router.
+
+``python -m telemetry.nodes.stations --runtime DIR --station NAME --router tls/HOST:PORT --file FILE``. Nothing that
+flies needs it: without a router it tries again, and says so. It tells no vehicle anything.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import logging
+import secrets
+import sys
+import time
+from pathlib import Path
+
+from telemetry.bus.bus import Bus
+from telemetry.bus.node import LOOK_EVERY_S, NodeContext, run_node
+from telemetry.errors import StationsError
+from telemetry.stations.keys import beacon_key, checked_name, vehicle_key
+from telemetry.stations.roster import Roster
+from telemetry.stations.summary import encode
+from telemetry.stations.telling import Telling
+from telemetry.stations.wire import Route, Wire
+from telemetry.topics.messages import Topic
+from telemetry.topics.stations import OwnVehicles, StationsStatus
+
+_log = logging.getLogger(__name__)
+
+TURN_S, BEACON_S, STATUS_S, AGAIN_S = 0.1, 1.0, 0.5, 1.0
+
+
+class StationsNode:
+    """Belongs to one event loop; Zenoh's threads stay behind ``Wire``."""
+
+    def __init__(self, bus: Bus, context: NodeContext, station: str, route: Route) -> None:
+        self._bus, self._context, self._station, self._route = bus, context, station, route
+        run = secrets.randbits(32)
+        self._roster, self._telling = Roster(station, run), Telling(run)
+        self._own = OwnVehicles(0.0)
+        self._wire: Wire | None = None
+        self._fault = ""
+        self._told: StationsStatus | None = None
+
+    async def run(self) -> None:
+        """Until nobody needs it any more."""
+        async with asyncio.TaskGroup() as group:
+            tasks = [group.create_task(part()) for part in (self._hear_own, self._keep_wire, self._tell_bus)]
+            while self._context.is_needed():
+                await asyncio.sleep(LOOK_EVERY_S)
+            for task in tasks:
+                task.cancel()
+
+    async def _hear_own(self) -> None:
+        async for _, message in self._bus.subscribe(Topic.STATIONS_OWN):
+            if isinstance(message, OwnVehicles):
+                self._own = message
+
+    async def _keep_wire(self) -> None:
+        """Until cancelled. Before the first connection it is tried again here, later by Zenoh itself."""
+        while True:
+            try:
+                self._wire = await Wire.open(self._route, time.monotonic)
+            except StationsError as error:
+                self._note(error.what + " " + error.advice)
+                await asyncio.sleep(AGAIN_S)
+                continue
+            try:
+                async with asyncio.TaskGroup() as group:
+                    for part in (self._tell_others, self._hear_others, self._watch_router):
+                        group.create_task(part(self._wire))
+            finally:
+                wire, self._wire = self._wire, None
+                await wire.close()
+
+    async def _tell_others(self, wire: Wire) -> None:
+        beacon_s = 0.0
+        while True:
+            now_s = time.monotonic()
+            if now_s - beacon_s >= BEACON_S:
+                beacon_s = now_s
+                beacon = self._roster.beacon(len(self._own.vehicles), now_s=now_s, now_utc_s=time.time())
+                wire.put(beacon_key(self._station), encode(beacon))
+            for number, message in self._telling.due(self._own.vehicles, now_s):
+                wire.put(vehicle_key(self._station, number), encode(message))
+            await asyncio.sleep(TURN_S)
+
+    async def _hear_others(self, wire: Wire) -> None:
+        while True:
+            await wire.arrived.wait()
+            wire.arrived.clear()
+            waiting, refused = wire.inbox.take()
+            utc_less_mono_s = time.time() - time.monotonic()
+            for key, (payload, came_s) in waiting.items():
+                self._roster.on_message(key, payload, now_s=came_s, now_utc_s=came_s + utc_less_mono_s)
+            if refused:
+                self._roster.refuse("Messages were too long, or under more names than are kept.", refused)
+
+    async def _watch_router(self, wire: Wire) -> None:
+        where = ", ".join(self._route.routers)
+        while True:
+            if await wire.is_connected():
+                self._note("")
+            else:
+                self._note(
+                    f"The router at {where} does not answer: other stations are neither seen nor told anything. "
+                    "Own vehicles are not affected. Start it again, or mend the network."
+                )
+            await asyncio.sleep(STATUS_S)
+
+    def _note(self, fault: str) -> None:
+        if fault != self._fault:
+            self._fault = fault
+            _log.log(logging.WARNING if fault else logging.INFO, "%s", fault or "The router answers.")
+
+    async def _tell_bus(self) -> None:
+        while True:
+            status, told = self._status(), self._told
+            if told is None or status.t_mono_s - told.t_mono_s >= STATUS_S or _differ(status, told):
+                self._told = status
+                self._bus.publish(Topic.STATIONS, status)
+            await asyncio.sleep(TURN_S)
+
+    def _status(self) -> StationsStatus:
+        now_s, roster = time.monotonic(), self._roster
+        connected = self._wire is not None and not self._fault
+        text = self._fault or ("" if connected else "The router is being looked for.")
+        if roster.has_namesake(now_s):
+            text = f"Another station calls itself {self._station}, too. Give one of them another name. {text}".strip()
+        return StationsStatus(
+            t_mono_s=now_s,
+            station=self._station,
+            router="connected" if connected else "lost",
+            text=text,
+            stations=roster.stations(now_s, time.time()),
+            vehicles=roster.vehicles(now_s),
+            refused=roster.refused,
+            refused_last=roster.refused_last,
+        )
+
+
+def _differ(status: StationsStatus, told: StationsStatus) -> bool:
+    """A router or a station came or went."""
+    return (status.router, [(s.name, s.state) for s in status.stations]) != (
+        told.router,
+        [(s.name, s.state) for s in told.stations],
+    )
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="stations", description="Sees the vehicles of other stations.")
+    parser.add_argument("--runtime", type=Path, required=True, help="directory of the bus's sockets")
+    parser.add_argument("--station", type=checked_name, required=True, help="this station's name")
+    parser.add_argument("--router", action="append", required=True, help="tls/HOST:PORT; may be given several times")
+    parser.add_argument("--file", type=Path, required=True, help="the station's key and certificates (PEM)")
+    options = parser.parse_args()
+    route = Route(tuple(options.router), options.file)
+
+    async def live(bus: Bus, context: NodeContext) -> None:
+        await StationsNode(bus, context, options.station, route).run()
+
+    return run_node("stations", options.runtime, live)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

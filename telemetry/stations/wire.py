@@ -1,0 +1,167 @@
+"""The way to the router: a second Zenoh session, as a client over TLS, beside the bus and apart from it.
+
+Both ends show certificates. No multicast, no gossip, no listening: nothing but the routers that are named is spoken to.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import contextlib
+import json
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import zenoh
+
+from telemetry.errors import StationsError
+from telemetry.stations.keys import EVERYTHING, MOST_STATIONS, MOST_VEHICLES
+from telemetry.stations.router_file import LEASE_MS
+from telemetry.stations.summary import BEACON_BYTES
+
+CONNECT_S = 3.0
+_MOST_WAITING = MOST_STATIONS * (MOST_VEHICLES + 1)
+_SETTINGS: dict[str, Any] = {
+    "mode": "client",
+    "scouting/multicast/enabled": False,
+    "scouting/gossip/enabled": False,
+    "timestamping/enabled": False,
+    "transport/shared_memory/enabled": False,
+    "transport/link/protocols": ["tls"],
+    "transport/link/rx/max_message_size": 65_536,
+    "transport/link/tx/lease": LEASE_MS,
+    "transport/link/tls/enable_mtls": True,
+    "transport/link/tls/verify_name_on_connect": True,
+    "transport/link/tls/close_link_on_expiration": True,
+    # What cannot leave at once is old by the time it could: the next word of the vehicle counts.
+    "transport/link/tx/queue/congestion_control/drop/wait_before_drop": 0,
+    "transport/link/tx/queue/size/data": 2,
+    "connect/timeout_ms": round(1000 * CONNECT_S),
+    "connect/exit_on_failure": True,
+    # After it was once connected, Zenoh itself connects again.
+    "connect/retry": {"period_init_ms": 500, "period_max_ms": 2000, "period_increase_factor": 1.5},
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """Where the router is, and what proves who this station is."""
+
+    routers: tuple[str, ...]
+    """``tls/HOST:PORT``; the first that answers is used"""
+    file: Path
+    """The station's key, its certificate and the authority's, as PEM (``hedgehop stations``)."""
+
+
+class Inbox:
+    """Filled by Zenoh's threads, emptied by the event loop: of each key the newest waits, of a bounded number of keys.
+
+    ``refused``: messages that were too long, or of more keys than there are stations and vehicles.
+    """
+
+    def __init__(self, wake: Callable[[], None]) -> None:
+        self._wake = wake
+        self._lock = threading.Lock()
+        self._waiting: dict[str, tuple[bytes, float]] = {}
+        self._refused = 0
+
+    def offer(self, key: str, payload: zenoh.ZBytes | bytes, came_mono_s: float) -> None:
+        with self._lock:
+            if len(payload) > BEACON_BYTES or (key not in self._waiting and len(self._waiting) >= _MOST_WAITING):
+                self._refused += 1
+                return
+            was_empty = not self._waiting
+            self._waiting[key] = bytes(payload), came_mono_s
+        if was_empty:
+            self._wake()
+
+    def take(self) -> tuple[dict[str, tuple[bytes, float]], int]:
+        """What waits, by key, with the time at which it came; and how many were refused since."""
+        with self._lock:
+            waiting, self._waiting = self._waiting, {}
+            refused, self._refused = self._refused, 0
+        return waiting, refused
+
+
+class Wire:
+    """``inbox`` is filled and ``arrived`` set while the session is open. All methods belong to the event loop."""
+
+    def __init__(self, session: zenoh.Session, clock: Callable[[], float]) -> None:
+        self._session, self.arrived = session, asyncio.Event()
+        loop = asyncio.get_running_loop()
+
+        def wake() -> None:
+            with contextlib.suppress(RuntimeError):  # the loop has ended
+                loop.call_soon_threadsafe(self.arrived.set)
+
+        self.inbox = inbox = Inbox(wake)
+        self._publishers: dict[str, zenoh.Publisher] = {}
+        self._subscriber = session.declare_subscriber(
+            EVERYTHING,
+            lambda sample: inbox.offer(str(sample.key_expr), sample.payload, clock()),
+            allowed_origin=zenoh.Locality.REMOTE,
+        )
+
+    @classmethod
+    async def open(cls, route: Route, clock: Callable[[], float]) -> Wire:
+        """Raises StationsError where no router answers within ``CONNECT_S``, or one of the two refuses the other."""
+        opening = asyncio.ensure_future(asyncio.to_thread(_opened, route))
+        try:
+            return cls(await asyncio.shield(opening), clock)
+        except asyncio.CancelledError:
+            with contextlib.suppress(StationsError):
+                await asyncio.to_thread((await opening).close)
+            raise
+
+    def put(self, key: str, payload: bytes) -> None:
+        """Never blocks: what finds no room is dropped."""
+        publisher = self._publishers.get(key)
+        if publisher is None:
+            publisher = self._publishers[key] = self._session.declare_publisher(
+                key,
+                congestion_control=zenoh.CongestionControl.DROP,
+                allowed_destination=zenoh.Locality.REMOTE,
+            )
+        publisher.put(payload)
+
+    async def is_connected(self) -> bool:
+        return bool(await asyncio.to_thread(self._session.info.routers_zid))
+
+    async def close(self) -> None:
+        await asyncio.to_thread(self._session.close)
+
+
+def _opened(route: Route) -> zenoh.Session:
+    config = zenoh.Config()
+    settings: dict[str, Any] = {**_SETTINGS, **_shown(route.file), "connect/endpoints": list(route.routers)}
+    try:
+        for name, value in settings.items():
+            config.insert_json5(name, json.dumps(value))
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        raise StationsError(
+            f"No router answers at {', '.join(route.routers)}, or it and this station refuse each other.",
+            where=str(route.file),
+            advice="Start the router, see that the network leads to it, and that its certificate is for that name.",
+        ) from error
+
+
+def _shown(file: Path) -> dict[str, str]:
+    """What proves who this station is, and whom it trusts. Raises StationsError."""
+    begin = "-----BEGIN "
+    try:
+        parts = [begin + part for part in file.read_text(encoding="ascii").split(begin)[1:]]
+        key, certificate, authority = (base64.b64encode(part.encode()).decode() for part in parts)
+    except (OSError, ValueError) as error:
+        raise StationsError(
+            f"The station's file cannot be read: {error}.", where=str(file), advice="Make it with hedgehop stations."
+        ) from error
+    tls = "transport/link/tls"
+    return {
+        f"{tls}/connect_private_key_base64": key,
+        f"{tls}/connect_certificate_base64": certificate,
+        f"{tls}/root_ca_certificate_base64": authority,
+    }

@@ -1,0 +1,172 @@
+"""Stations as they run: a router, a bus and a *stations* node for each, and vehicles whose place tells the time."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+import time
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+from server.door.certificates import CertificateFiles, now_utc
+from server.door.station_files import ROUTER_FILE, write_station_files
+from telemetry.bus.bus import Bus
+from telemetry.topics.messages import ServerAlive, Topic
+from telemetry.topics.stations import FleetVehicle, OtherVehicle, OwnVehicles, StationsStatus
+from tests.free_ports import free_port
+
+PATIENCE_S = 90.0
+DEG_PER_S = 1e-4
+_ROUTER = """
+import sys, zenoh
+session = zenoh.open(zenoh.Config.from_file(sys.argv[1]))
+print("open", flush=True)
+sys.stdin.read()
+"""
+
+
+def own_vehicles(count: int) -> OwnVehicles:
+    """All fly, and their latitude is the time."""
+    now_s = time.monotonic()
+    lat_deg = 40.0 + DEG_PER_S * (now_s % 10_000)
+    vehicles = (
+        FleetVehicle(
+            number=number,
+            name=f"Drone {number}",
+            mode="AUTO",
+            armed=True,
+            in_air=True,
+            link="live",
+            link_quality=0.99,
+            position_t_mono_s=now_s,
+            lat_deg=lat_deg,
+            lon_deg=8.0,
+            alt_amsl_m=500.0,
+            alt_rel_home_m=30.0,
+            alt_surface_m=12.0,
+            v_enu_m_s=(0.0, 11.1, 0.0),
+            heading_rad=0.0,
+            within_m=0.6,
+            battery_share=0.63,
+            battery="63 %, 12 min to the reserve",
+            plan="Ridge survey",
+            plan_share=0.4,
+        )
+        for number in range(1, count + 1)
+    )
+    return OwnVehicles(now_s, tuple(vehicles))
+
+
+def true_age_s(other: OtherVehicle, at_mono_s: float) -> float:
+    """Of its position: all processes here have one clock."""
+    assert other.it.lat_deg is not None
+    was_s = (other.it.lat_deg - 40.0) / DEG_PER_S
+    return (at_mono_s % 10_000) - was_s
+
+
+class Router:
+    """Zenoh's own, with the file that is written for zenohd."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self._process: subprocess.Popen[str] | None = None
+
+    async def start(self) -> None:
+        command = [sys.executable, "-c", _ROUTER, str(self._file)]
+        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        assert self._process.stdout is not None
+        assert await asyncio.to_thread(self._process.stdout.readline) == "open\n"
+
+    def kill(self) -> None:
+        if self._process is None:
+            return
+        self._process.kill()
+        self._process.communicate(timeout=PATIENCE_S)
+        self._process = None
+
+
+class FieldStation:
+    """The server's place on a bus, and the node beside it. ``shown``: its certificate's name, if that is another."""
+
+    def __init__(self, name: str, bus: Bus, folder: Path, router: str, *, shown: str, vehicles: int) -> None:
+        self.name, self.bus, self._vehicles = name, bus, vehicles
+        self.statuses: list[StationsStatus] = []
+        command = [sys.executable, "-m", "telemetry.nodes.stations", "--runtime", str(bus.runtime_dir)]
+        command += ["--station", name, "--router", router, "--file", str(folder / f"{shown}.pem")]
+        self._log = (bus.runtime_dir / "log").open("wb")
+        self.node = subprocess.Popen(command, start_new_session=True, stderr=self._log)
+
+    async def live(self) -> None:
+        """Until cancelled."""
+        async with asyncio.TaskGroup() as group:
+            group.create_task(self._tell())
+            group.create_task(self._hear())
+
+    async def until(self, holds: Callable[[StationsStatus], bool]) -> StationsStatus:
+        """The first status from now on of which it holds."""
+        begun = len(self.statuses)
+        async with asyncio.timeout(PATIENCE_S):
+            while True:
+                for status in self.statuses[begun:]:
+                    if holds(status):
+                        return status
+                begun = len(self.statuses)
+                await asyncio.sleep(0.02)
+
+    async def sees(self, *others: str) -> StationsStatus:
+        """All of these live, with vehicles whose age is known, and no others."""
+
+        def holds(status: StationsStatus) -> bool:
+            live = {station.name for station in status.stations if station.state == "live" and station.hears_us}
+            aged = {other.station for other in status.vehicles if other.oldest_t_mono_s is not None}
+            return status.router == "connected" and live == aged == set(others)
+
+        return await self.until(holds)
+
+    def end(self) -> None:
+        self.node.kill()
+        self.node.wait(timeout=PATIENCE_S)
+        self._log.close()
+
+    async def _tell(self) -> None:
+        while True:
+            self.bus.publish(Topic.SERVER, ServerAlive(time.monotonic(), 1))
+            self.bus.publish(Topic.STATIONS_OWN, own_vehicles(self._vehicles))
+            await asyncio.sleep(0.2)
+
+    async def _hear(self) -> None:
+        async for _, message in self.bus.subscribe(Topic.STATIONS):
+            if isinstance(message, StationsStatus):
+                self.statuses.append(message)
+
+
+class Field:
+    """Several stations around a router. ``through`` gives each its own way to the router's port: a bad line."""
+
+    def __init__(self, folder: Path, names: Sequence[str]) -> None:
+        self.folder, self.port = folder, free_port()
+        self.files = folder / "fleet"
+        endpoint = f"tls/127.0.0.1:{self.port}"
+        authority = CertificateFiles(folder / "data")
+        write_station_files(self.files, authority, names, ["127.0.0.1"], now_utc(), listen=[endpoint])
+        self.router = Router(self.files / ROUTER_FILE)
+        self.stations: dict[str, FieldStation] = {}
+
+    @asynccontextmanager
+    async def station(
+        self, name: str, *, shown: str = "", vehicles: int = 2, port: int | None = None
+    ) -> AsyncIterator[FieldStation]:
+        """While it runs."""
+        async with await Bus.open(self.folder / f"run-{len(self.stations)}", "server") as bus:
+            router = f"tls/127.0.0.1:{port or self.port}"
+            station = FieldStation(name, bus, self.files, router, shown=shown or name, vehicles=vehicles)
+            self.stations[f"{name} {len(self.stations)}"] = station
+            living = asyncio.ensure_future(station.live())
+            try:
+                yield station
+            finally:
+                living.cancel()
+                await asyncio.wait([living])
+                station.end()

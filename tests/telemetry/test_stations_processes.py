@@ -1,0 +1,143 @@
+"""Stations as processes around a router with TLS and access control: they see each other, and nobody is taken in."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import json
+import signal
+from contextlib import AsyncExitStack
+from pathlib import Path
+
+import zenoh
+
+from server.door.certificates import CertificateFiles, Names, now_utc
+from telemetry.stations.keys import beacon_key, vehicle_key
+from telemetry.stations.other import LOST_S
+from telemetry.stations.summary import encode, vehicle_wire
+from telemetry.topics.stations import FleetVehicle, StationsStatus
+from tests.telemetry.bus_runs import run, short_folder
+from tests.telemetry.station_fleet import Field, true_age_s
+
+ROUND_S = 2e-3
+NAMES = ("Alpha", "Bravo", "Charlie")
+
+
+def test_three_stations_see_each_other_and_again_after_the_router_died() -> None:
+    async def whole(folder: Path) -> None:
+        field = Field(folder, NAMES)
+        async with AsyncExitStack() as stack:
+            stack.callback(field.router.kill)
+            alpha, bravo, charlie = [await stack.enter_async_context(field.station(name)) for name in NAMES]
+            # No router yet: said, and nothing else happens.
+            await alpha.until(lambda status: "No router answers" in status.text)
+            await field.router.start()
+            seen = await alpha.sees("Bravo", "Charlie")
+            await bravo.sees("Alpha", "Charlie")
+            await charlie.sees("Alpha", "Bravo")
+            _ages_are_true(seen)
+            assert len(seen.vehicles) == 4
+            assert seen.refused == 0
+            # The router dies: both others are lost at once, with words; it comes back, and so do they.
+            field.router.kill()
+            lost = await alpha.until(lambda status: all(station.state == "lost" for station in status.stations))
+            assert all("is not heard since" in station.text for station in lost.stations)
+            assert all(lost.t_mono_s - station.heard_t_mono_s < LOST_S + 2.0 for station in lost.stations)
+            away = await alpha.until(lambda status: status.router == "lost")
+            assert "Own vehicles are not affected" in away.text
+            assert len(away.vehicles) == 4
+            await field.router.start()
+            _ages_are_true(await alpha.sees("Bravo", "Charlie"))
+            await charlie.sees("Alpha", "Bravo")
+            # One of them ends: the other stays.
+            bravo.node.send_signal(signal.SIGTERM)
+            gone = await alpha.until(lambda status: [s.state for s in status.stations] == ["lost", "live"])
+            assert gone.stations[0].name == "Bravo"
+            assert await asyncio.to_thread(bravo.node.wait, 30.0) == 0
+
+    _in_folder(whole)
+
+
+def test_the_router_lets_nobody_speak_under_anothers_name() -> None:
+    async def whole(folder: Path) -> None:
+        field = Field(folder, NAMES)
+        async with AsyncExitStack() as stack:
+            stack.callback(field.router.kill)
+            await field.router.start()
+            alpha = await stack.enter_async_context(field.station("Alpha"))
+            await stack.enter_async_context(field.station("Charlie"))
+            await alpha.sees("Charlie")
+            # Bravo's name with Alpha's certificate: it hears, and nobody hears it; it says so.
+            impostor = await stack.enter_async_context(field.station("Bravo", shown="Alpha"))
+            told = await impostor.until(
+                lambda status: (
+                    len(status.stations) == 2
+                    and all("does not hear this station" in station.text for station in status.stations)
+                )
+            )
+            assert not any(station.hears_us for station in told.stations)
+            # By hand, with a whole message: Charlie's certificate, and Alpha's name, or another one's.
+            with _session(field, "Charlie") as session:
+                forged = vehicle_wire(FleetVehicle(7, "Forged"), run=5, count=1, now_mono_s=1.0)
+                for name in ("Alpha", "Bravo", "Delta"):
+                    session.put(vehicle_key(name, 7), encode(forged))
+                    session.delete(vehicle_key(name, 1))
+                # Under its own name it is let through, and there it is refused as what it is.
+                for payload in (b"", b"\xff" * 40, b"x" * 60_000):
+                    before = alpha.statuses[-1].refused
+                    session.put(beacon_key("Charlie"), payload)
+                    await alpha.until(lambda status, before=before: status.refused > before)
+                session.put("hedgehop/stations/1/Charlie/order/1", b"land")
+                seen = await alpha.until(lambda status: "no station uses" in status.refused_last)
+            assert {station.name for station in seen.stations} == {"Charlie"}
+            assert 7 not in {other.it.number for other in seen.vehicles}
+            _ages_are_true(await alpha.sees("Charlie"))
+
+    _in_folder(whole)
+
+
+def test_without_a_certificate_of_the_authority_nobody_comes_in() -> None:
+    async def whole(folder: Path) -> None:
+        field, others = Field(folder, NAMES), Field(folder / "others", NAMES)
+        async with AsyncExitStack() as stack:
+            stack.callback(field.router.kill)
+            await field.router.start()
+            alpha = await stack.enter_async_context(field.station("Alpha"))
+            await alpha.until(lambda status: status.router == "connected")
+            (field.files / "Bravo.pem").write_bytes((others.files / "Bravo.pem").read_bytes())
+            bravo = await stack.enter_async_context(field.station("Bravo"))
+            await bravo.until(lambda status: "No router answers" in status.text)
+            # The console's certificate is of the same authority, and shows no station.
+            CertificateFiles(folder / "data").renew(now_utc(), Names(frozenset({"localhost"}), frozenset()))
+            (field.files / "Charlie.pem").write_bytes((folder / "data" / "tls" / "console.pem").read_bytes())
+            charlie = await stack.enter_async_context(field.station("Charlie"))
+            await charlie.until(lambda status: "No router answers" in status.text)
+            assert alpha.statuses[-1].stations == ()
+
+    _in_folder(whole)
+
+
+def _ages_are_true(status: StationsStatus) -> None:
+    """At the worse end of what is told, and no worse than a loaded machine makes it."""
+    for other in status.vehicles:
+        assert other.oldest_t_mono_s is not None
+        oldest_s = status.t_mono_s - other.oldest_t_mono_s
+        true_s = true_age_s(other, status.t_mono_s)
+        assert oldest_s - other.unsure_s - ROUND_S <= true_s <= oldest_s + ROUND_S
+
+
+def _session(field: Field, name: str) -> zenoh.Session:
+    begin = "-----BEGIN "
+    parts = [begin + part for part in (field.files / f"{name}.pem").read_text().split(begin)[1:]]
+    settings = {"mode": "client", "connect/endpoints": [f"tls/127.0.0.1:{field.port}"]}
+    for what, part in zip(("connect_private_key", "connect_certificate", "root_ca_certificate"), parts, strict=True):
+        settings[f"transport/link/tls/{what}_base64"] = base64.b64encode(part.encode()).decode()
+    config = zenoh.Config()
+    for key, value in {**settings, "transport/link/tls/enable_mtls": True, "scouting/multicast/enabled": False}.items():
+        config.insert_json5(key, json.dumps(value))
+    return zenoh.open(config)
+
+
+def _in_folder(whole: object) -> None:
+    with short_folder() as folder:
+        run(lambda: whole(folder))  # type: ignore[operator]
