@@ -8,10 +8,13 @@ from collections.abc import Coroutine, Sequence
 from typing import Any
 
 from server.door.hub import Hub
+from server.door.station_files import station_of
 from server.errors import BadRequestError, NotFoundError
 from server.flying.apart.airspace import Airspace
 from server.flying.apart.nearness import Nearness
+from server.flying.apart.other_stations import Meeting, OtherStations
 from server.flying.apart.other_vehicles import OtherVehicles
+from server.flying.apart.own_told import fleet_vehicle
 from server.flying.bags.bag_desk import BagDesk
 from server.flying.checklists import Checklists
 from server.flying.recordings import RecordingDesk
@@ -34,6 +37,7 @@ from server.work.jobs import Lane
 from server.workspace import Workspace
 from telemetry.bus.node_lock import running_nodes
 from telemetry.topics.messages import Topic
+from telemetry.topics.stations import FleetVehicle
 
 TELL_EVERY_S = 0.2
 
@@ -41,7 +45,10 @@ TELL_EVERY_S = 0.2
 class Fleet:
     """All methods belong to the event loop. Replay and the UWB radar are on the first vehicle's bus."""
 
-    def __init__(self, flights: Sequence[Flying], present: Present, shared: Shared) -> None:
+    def __init__(
+        self, flights: Sequence[Flying], present: Present, shared: Shared, meeting: Meeting | None = None
+    ) -> None:
+        """``meeting``: where other stations are met, if they are."""
         self._flights = {flying.number: flying for flying in flights}
         self._present, self._shared = present, shared
         workspace, library, shelf = shared.workspace, shared.library, shared.shelf
@@ -59,10 +66,16 @@ class Fleet:
         self.recordings = RecordingDesk(shelf, workspace.board, self.reviewing, present)
         self.bags = BagDesk(library, workspace.board, self.recordings)
         self.uwb = LiveUwb(workspace.traversability, library, self.first.bus)
-        self._nearness = Nearness({flying.number: (flying.name, flying.live) for flying in flights})
+        self._stations = meeting and OtherStations(meeting, self.first.bus, self.first.nodes, shared.hub, self._own)
+        stations = self._stations
+        self._nearness = Nearness(
+            {flying.number: (flying.name, flying.live) for flying in flights},
+            elsewhere=(lambda _: ()) if stations is None else stations.flown,
+        )
         self._others = OtherVehicles(
             {flying.number: flying.as_other for flying in flights},
             {flying.number: flying.desk.on_others for flying in flights},
+            elsewhere=(lambda: None) if stations is None else stations.row,
         )
         self._scenery = Scenery(
             workspace.stage,
@@ -77,7 +90,11 @@ class Fleet:
     async def open(
         cls, settings: Settings, library: Library, hub: Hub, workspace: Workspace, scenarios: ScenarioDesk, demo: bool
     ) -> Fleet:
-        """Joins the buses; nodes that a server before this one has left running are taken over. Raises BusError."""
+        """Joins the buses; nodes that a server before this one has left running are taken over.
+
+        Raises BusError, StartError.
+        """
+        meeting = await asyncio.to_thread(_meeting, settings)
         present = Present(hub)
         shelf = await asyncio.to_thread(RecordingShelf, library)
         checklists = await asyncio.to_thread(Checklists, library.root)
@@ -89,7 +106,7 @@ class Fleet:
         except BaseException:
             await asyncio.gather(*(flying.close() for flying in flights))
             raise
-        return cls(flights, present, shared)
+        return cls(flights, present, shared, meeting)
 
     # The vehicles
 
@@ -139,7 +156,8 @@ class Fleet:
             *(loop for flying in self.flights for loop in flying.loops(demo=demo)),
             *self._relay().loops(),
             self._hear_of_plan(),
-            *([self._tell(), self._nearness.run(), self._others.run()] if len(self._flights) > 1 else []),
+            *([self._tell(), self._nearness.run(), self._others.run()] if self._has_others else []),
+            *([] if self._stations is None else self._stations.loops()),
             self.recordings.run(),
             self._scenery.run(),
             self._airspace.run(),
@@ -180,7 +198,17 @@ class Fleet:
 
     def present(self) -> list[ServerMessage]:
         """What a page is told right after its snapshot, whichever vehicle it shows."""
-        return [*self._present.messages(), *([self._message] if len(self._flights) > 1 else [])]
+        others = [] if self._stations is None else [self._stations.message()]
+        return [*self._present.messages(), *([self._message] if self._has_others else []), *others]
+
+    @property
+    def _has_others(self) -> bool:
+        """A vehicle beside the first one, or another station's."""
+        return len(self._flights) > 1 or self._stations is not None
+
+    def _own(self) -> list[FleetVehicle]:
+        near = self._nearness.alarms
+        return [fleet_vehicle(f.doc(near.get(f.number)), f.live, f.connections.status) for f in self.flights]
 
     @property
     def _message(self) -> FleetMessage:
@@ -191,6 +219,12 @@ class Fleet:
         while True:
             self._shared.hub.publish(self._message)
             await asyncio.sleep(TELL_EVERY_S)
+
+
+def _meeting(settings: Settings) -> Meeting | None:
+    """Raises StartError."""
+    file = settings.stations_file
+    return None if file is None else Meeting(station_of(file), settings.stations_router, file)
 
 
 def _wanted(settings: Settings, library: Library, demo: bool) -> list[VehicleWanted]:

@@ -80,6 +80,11 @@ class Channel:
         return self.state is not None and self.state.armed and self.state.landed != "on_ground"
 
     @property
+    def battery(self) -> str:
+        """In words, as it was told last; empty: it was not."""
+        return next((row.value for row in self._health_told.rows or () if row.code == "battery"), "")
+
+    @property
     def home(self) -> tuple[float, float] | None:
         """(lat_deg, lon_deg)"""
         state = self.state

@@ -20,6 +20,7 @@ from telemetry.topics.vehicle import RadarKind
 LINK, RECORDER, REPLAY, SIMULATOR = "link", "recorder", "replay", "simulator"
 TRACKS = "tracks"
 SIMULATED_SENSORS = "sensors"
+STATIONS = "stations"
 
 _SENSOR_SEED = 1
 _RETURN_HEIGHT: dict[DemoAutopilot, str] = {"ardupilot": "RTL_ALT={1:.0f}", "px4": "RTL_RETURN_ALT={0:.2f}"}
@@ -111,6 +112,11 @@ class Nodes:
         """Moving objects in what the radar sends."""
         await self.supervisor.start(TRACKS, [])
 
+    async def stations(self, name: str, routers: Sequence[str], file: Path) -> None:
+        """Vehicles of other stations, met at a router."""
+        arguments = [part for router in routers for part in ("--router", router)]
+        await self.supervisor.start(STATIONS, ["--station", name, *arguments, "--file", str(file.absolute())])
+
     async def simulated_sensors(self, ground: Ground, world: Path) -> None:
         """Radar, camera and its pose, of the simulated vehicle in its world."""
         arguments = ["--world", str(world), "--dsm", str(ground.path), "--seed", str(_SENSOR_SEED)]
@@ -131,7 +137,7 @@ class Nodes:
 
     async def stop_all(self) -> None:
         """The simulated vehicle last: until then its link may say farewell."""
-        for names in ((REPLAY, LINK, RECORDER, SIMULATED_SENSORS, TRACKS, *SENSORS), (SIMULATOR,)):
+        for names in ((REPLAY, LINK, RECORDER, SIMULATED_SENSORS, TRACKS, STATIONS, *SENSORS), (SIMULATOR,)):
             await asyncio.gather(*(self.supervisor.stop(name) for name in names))
 
     def _changed(self, nodes: Sequence[NodeState]) -> None:

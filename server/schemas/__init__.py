@@ -126,7 +126,15 @@ from server.schemas.result_docs import (
     WorstDoc,
 )
 from server.schemas.review_docs import Histogram, ReviewDoc, ReviewEvent, ReviewFigures, ReviewSeries
-from server.schemas.station_docs import AlarmDoc, AuditDoc, AuditEntryDoc, VehicleAlarm, VehicleDoc
+from server.schemas.station_docs import (
+    AlarmDoc,
+    AuditDoc,
+    AuditEntryDoc,
+    OtherStationDoc,
+    OtherVehicleDoc,
+    VehicleAlarm,
+    VehicleDoc,
+)
 from server.schemas.stream import (
     ActiveMessage,
     AlarmsMessage,
@@ -160,6 +168,7 @@ from server.schemas.stream import (
     SelectionMessage,
     ServerMessage,
     Snapshot,
+    StationsMessage,
     TextMessage,
     TrackMessage,
     TracksMessage,

@@ -96,3 +96,39 @@ class HealthDoc(Strict):
     loop: LoopDoc | None = None
     confinement: str | None = None
     """What is refused to workers and to decoders of rasters on this machine."""
+
+
+class OtherVehicleDoc(Strict):
+    """A vehicle of another station, which only that one commands; null where nothing is known."""
+
+    number: int
+    name: str
+    age_s: float | None = None
+    """Of its position, at the worse end; null: it has none, or its station's clock was not compared yet."""
+    is_old: bool = True
+    lat_deg: float | None = None
+    lon_deg: float | None = None
+    alt_rel_home_m: float | None = None
+    alt_amsl_m: float | None = None
+    alt_surface_m: float | None = None
+    ground_speed_m_s: float | None = None
+    mode: str = ""
+    armed: bool = False
+    in_air: bool = False
+    link: Literal["none", "live", "stale", "lost"] = "none"
+    battery: str = ""
+    plan: str = ""
+    plan_share: float | None = None
+    text: str = ""
+    """What is wrong with it, or with what is known of it."""
+
+
+class OtherStationDoc(Strict):
+    name: str
+    state: Literal["live", "lost"]
+    silent_s: float
+    round_trip_s: float | None = None
+    clock_ahead_s: float | None = None
+    text: str = ""
+    """What is wrong and what to do."""
+    vehicles: list[OtherVehicleDoc]

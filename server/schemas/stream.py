@@ -14,7 +14,7 @@ from server.schemas.library_docs import JobDoc, LibraryState
 from server.schemas.obstacle_docs import ObstaclesState, SensorName
 from server.schemas.result_docs import ErrorDoc, PlanState
 from server.schemas.review_docs import ReviewDoc
-from server.schemas.station_docs import AlarmDoc, VehicleDoc
+from server.schemas.station_docs import AlarmDoc, OtherStationDoc, VehicleDoc
 from server.schemas.strict_model import Message
 from server.schemas.study_docs import RadarFileDoc, ScenarioRunDoc
 from server.schemas.traversability_docs import TraversabilityState
@@ -85,6 +85,20 @@ class FleetMessage(Message):
 
     type: Literal["fleet"] = "fleet"
     vehicles: list[VehicleDoc]
+
+
+class StationsMessage(Message):
+    """Other stations and their vehicles, twice a second, where this station meets them at a router."""
+
+    type: Literal["stations"] = "stations"
+    station: str
+    """This one's name."""
+    router: Literal["connected", "lost"]
+    text: str
+    """What is wrong with the way to them, and what to do; empty: nothing."""
+    stations: list[OtherStationDoc]
+    refused: int
+    """Messages that were malformed, foreign or repeated."""
 
 
 class ClockMessage(Message):
@@ -305,6 +319,7 @@ ServerMessage = Annotated[
     | ActiveMessage
     | AlarmsMessage
     | FleetMessage
+    | StationsMessage
     | PlanMessage
     | LibraryMessage
     | ViewMessage

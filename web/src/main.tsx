@@ -20,6 +20,7 @@ import "./styles/messages.css";
 import "./styles/menus.css";
 import "./styles/dialogs.css";
 import "./styles/account.css";
+import "./styles/stations.css";
 import "./styles/strip.css";
 import "./styles/fleet.css";
 import "./styles/hold.css";

@@ -1462,6 +1462,41 @@ export interface HealthDoc {
   confinement?: string | null;
 }
 
+/** A vehicle of another station, which only that one commands; null where nothing is known. */
+export interface OtherVehicleDoc {
+  number: number;
+  name: string;
+  /** Of its position, at the worse end; null: it has none, or its station's clock was not compared yet. */
+  age_s: number | null;
+  is_old: boolean;
+  lat_deg: number | null;
+  lon_deg: number | null;
+  alt_rel_home_m: number | null;
+  alt_amsl_m: number | null;
+  alt_surface_m: number | null;
+  ground_speed_m_s: number | null;
+  mode: string;
+  armed: boolean;
+  in_air: boolean;
+  link: "none" | "live" | "stale" | "lost";
+  battery: string;
+  plan: string;
+  plan_share: number | null;
+  /** What is wrong with it, or with what is known of it. */
+  text: string;
+}
+
+export interface OtherStationDoc {
+  name: string;
+  state: "live" | "lost";
+  silent_s: number;
+  round_trip_s: number | null;
+  clock_ahead_s: number | null;
+  /** What is wrong and what to do. */
+  text: string;
+  vehicles: OtherVehicleDoc[];
+}
+
 /** A line for each point; ``#`` begins a heading. */
 export interface ChecklistText {
   profile: string;
@@ -2664,6 +2699,20 @@ export interface FleetMessage {
   vehicles: VehicleDoc[];
 }
 
+/** Other stations and their vehicles, twice a second, where this station meets them at a router. */
+export interface StationsMessage {
+  v: 1;
+  type: "stations";
+  /** This one's name. */
+  station: string;
+  router: "connected" | "lost";
+  /** What is wrong with the way to them, and what to do; empty: nothing. */
+  text: string;
+  stations: OtherStationDoc[];
+  /** Messages that were malformed, foreign or repeated. */
+  refused: number;
+}
+
 /** The answer to a page's ping: what the page said its clock is, and the clock of all ``t_mono_s`` when it came. */
 export interface ClockMessage {
   v: 1;
@@ -2945,6 +2994,7 @@ export type ServerMessage =
   | ActiveMessage
   | AlarmsMessage
   | FleetMessage
+  | StationsMessage
   | PlanMessage
   | LibraryMessage
   | ViewMessage

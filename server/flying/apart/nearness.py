@@ -6,7 +6,7 @@ import asyncio
 import logging
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -36,6 +36,7 @@ EARLY_LATE_S, EARLY_LATE_SHARE = 2.0, 0.1
 VEER_SHARE = 0.2
 """Of its speed: so much a vehicle's ball grows in a second while nothing is heard, or where no plan is flown."""
 _ADVICE = "Hold one of them, or lead it away."
+_ALONE = "Hold yours or lead it away, and call the other station."
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,16 +46,27 @@ class Flown:
     name: str
     state: VehicleState
     ahead: Ahead | None
+    unsure_m: float = 0.0
+    """Added to its ball: what it may have moved because the age of its position is not known well."""
+
+
+Pair = tuple[int, int | str]
+"""Two of the station's vehicles by their numbers; or one, and another station's by its name."""
 
 
 class Nearness:
     """``alarms`` by the vehicle's number. All methods belong to the event loop."""
 
     def __init__(
-        self, channels: Mapping[int, tuple[str, Channel]], *, now_mono_s: Callable[[], float] = time.monotonic
+        self,
+        channels: Mapping[int, tuple[str, Channel]],
+        *,
+        elsewhere: Callable[[float], Sequence[Flown]] = lambda _: (),
+        now_mono_s: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._channels, self._now_mono_s = channels, now_mono_s
-        self._near: dict[tuple[int, int], Nearest] = {}
+        """``elsewhere``: other stations' vehicles in the air; they are held against these, not against each other."""
+        self._channels, self._elsewhere, self._now_mono_s = channels, elsewhere, now_mono_s
+        self._near: dict[Pair, Nearest] = {}
         self.alarms: dict[int, VehicleAlarm] = {}
 
     async def run(self) -> None:
@@ -74,21 +86,30 @@ class Nearness:
             if channel.state is not None and channel.in_air and channel.state.lat_deg is not None
         }
         now_s = self._now_mono_s()
-        found = await asyncio.to_thread(found_among, flown, now_s)
+        elsewhere = {each.name: each for each in self._elsewhere(now_s)}
+        found = await asyncio.to_thread(found_among, flown, now_s, elsewhere)
         limits_m = {pair: OVER_M if pair in self._near else NEAR_M for pair in found}
         self._near = {pair: at for pair, at in found.items() if at.distance_m < limits_m[pair]}
         self.alarms = {}
         for (one, other), at in sorted(self._near.items(), key=lambda item: -item[1].distance_m):
-            for number, of in ((one, other), (other, one)):
-                text = said(flown[number].name, flown[of].name, at, now_s)
-                self.alarms[number] = VehicleAlarm(kind="near", key=f"near {one} {other}", text=text)
+            key = f"near {one} {other}"
+            its_name = elsewhere[other].name if isinstance(other, str) else flown[other].name
+            text = said(flown[one].name, its_name, at, now_s, elsewhere=isinstance(other, str))
+            self.alarms[one] = VehicleAlarm(kind="near", key=key, text=text)
+            if isinstance(other, int):
+                text = said(its_name, flown[one].name, at, now_s)
+                self.alarms[other] = VehicleAlarm(kind="near", key=key, text=text)
 
 
-def found_among(flown: Mapping[int, Flown], now_s: float) -> dict[tuple[int, int], Nearest]:
+def found_among(
+    flown: Mapping[int, Flown], now_s: float, elsewhere: Mapping[str, Flown] | None = None
+) -> dict[Pair, Nearest]:
     """How near each pair comes to each other, by their numbers."""
-    found: dict[tuple[int, int], Nearest] = {}
-    for one, other in combinations(sorted(flown), 2):
-        if (at := near_each_other(flown[one], flown[other], now_s)) is not None:
+    pairs: list[Pair] = [*combinations(sorted(flown), 2), *((one, other) for one in flown for other in elsewhere or {})]
+    found: dict[Pair, Nearest] = {}
+    for one, other in pairs:
+        its = (elsewhere or {})[other] if isinstance(other, str) else flown[other]
+        if (at := near_each_other(flown[one], its, now_s)) is not None:
             found[one, other] = at
     return found
 
@@ -101,10 +122,11 @@ def near_each_other(one: Flown, other: Flown, now_s: float) -> Nearest | None:
     return nearest(one_line, other_line, since_s=now_s)
 
 
-def said(name: str, other: str, at: Nearest, now_s: float) -> str:
+def said(name: str, other: str, at: Nearest, now_s: float, *, elsewhere: bool = False) -> str:
     within_s = at.t_s - now_s
     when = "now" if within_s < 1.5 else f"in {within_s:.0f} s"
-    return f"{name} and {other} may come within {at.distance_m:.0f} m of each other {when}. {_ADVICE}"
+    advice = _ALONE if elsewhere else _ADVICE
+    return f"{name} and {other} may come within {at.distance_m:.0f} m of each other {when}. {advice}"
 
 
 def line_of(
@@ -117,7 +139,7 @@ def line_of(
     heard_s = now_s if state.position_t_mono_s is None else min(now_s, state.position_t_mono_s)
     v_enu_m_s = np.array([state.v_east_m_s or 0.0, state.v_north_m_s or 0.0, -(state.v_down_m_s or 0.0)])
     v_enu_m_s[2] *= not flat
-    radius_m = max(RADIUS_M, 2.0 * (state.horizontal_accuracy_m or 0.0))
+    radius_m = max(RADIUS_M, 2.0 * (state.horizontal_accuracy_m or 0.0)) + of.unsure_m
     home_m = None if flat else state.home_alt_amsl_m
     if ahead is not None and (flat or home_m is not None):
         east_m, north_m = offset_m(origin_deg, ahead.lat_lon_deg[:, 0], ahead.lat_lon_deg[:, 1])

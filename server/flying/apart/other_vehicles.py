@@ -42,6 +42,7 @@ _HOME_POINTS = 4
 PENDING = CheckRow(
     code="others", state="unknown", text="Whether another vehicle's way comes near is not known yet.", mend="Wait."
 )
+_WORST_FIRST = "bad", "unknown", "accept", "good"
 _ALONE = CheckRow(code="others", state="good", text="No other vehicle flies or has a mission on board.")
 _CLEAR = CheckRow(code="others", state="good", text="No other vehicle's way comes near this one.")
 
@@ -75,10 +76,11 @@ class OtherVehicles:
         look: Mapping[int, Callable[[], Other]],
         tell: Mapping[int, Callable[[CheckRow], None]],
         *,
+        elsewhere: Callable[[], CheckRow | None] = lambda: None,
         now_mono_s: Callable[[], float] = time.monotonic,
     ) -> None:
-        """Both by the vehicle's number."""
-        self._look, self._tell, self._now_mono_s = look, tell, now_mono_s
+        """``look`` and ``tell`` by the vehicle's number; ``elsewhere``: what other stations make of it."""
+        self._look, self._tell, self._elsewhere, self._now_mono_s = look, tell, elsewhere, now_mono_s
 
     async def run(self) -> None:
         """Until cancelled."""
@@ -93,14 +95,15 @@ class OtherVehicles:
 
     async def look(self) -> None:
         seen = {number: look() for number, look in self._look.items()}
-        for number, row in (await asyncio.to_thread(self._rows, seen)).items():
+        for number, row in (await asyncio.to_thread(self._rows, seen, self._elsewhere())).items():
             self._tell[number](row)
 
-    def _rows(self, seen: Mapping[int, Other]) -> dict[int, CheckRow]:
+    def _rows(self, seen: Mapping[int, Other], elsewhere: CheckRow | None) -> dict[int, CheckRow]:
         now_s, rows = self._now_mono_s(), {}
         for number, mine in seen.items():
             if not mine.flies or mine.waits_in_air:
-                rows[number] = row_against(mine, [other for key, other in seen.items() if key != number], now_s)
+                row = row_against(mine, [other for key, other in seen.items() if key != number], now_s)
+                rows[number] = row if elsewhere is None else _together(row, elsewhere)
         return rows
 
 
@@ -113,6 +116,14 @@ def row_against(mine: Other, others: Sequence[Other], now_s: float) -> CheckRow:
         return PENDING
     found = [row for other in others if (row := _against(mine, mine.on_board, other, now_s)) is not None]
     return min(found, key=lambda row: ("bad", "accept").index(row.state), default=_CLEAR)
+
+
+def _together(row: CheckRow, elsewhere: CheckRow) -> CheckRow:
+    """Both sentences where both are alike, else those of the worse."""
+    if row.state != elsewhere.state:
+        return min(row, elsewhere, key=lambda one: _WORST_FIRST.index(one.state))
+    mend = " ".join(filter(None, (row.mend, elsewhere.mend)))
+    return row.model_copy(update={"text": f"{row.text} {elsewhere.text}", "mend": mend})
 
 
 def _against(who: Other, mine: Whole, other: Other, now_s: float) -> CheckRow | None:

@@ -3,9 +3,11 @@ import { duration, number, withUnit } from "../format";
 import type { VehicleDoc } from "../messages";
 import { acknowledgeElsewhere, active, calling, fleet } from "../store/fleet";
 import { failed, late_s } from "../store/reach";
+import { stations } from "../store/stations";
 import { chooseVehicle } from "../store/stream";
 import { Button } from "../ui/Button";
 import { Icon } from "../ui/Icon";
+import { OtherStations } from "./OtherStations";
 
 function linkWord({ link, silent_s }: VehicleDoc): string {
   if (link === "none") return "not connected";
@@ -99,13 +101,15 @@ function Rows() {
   );
 }
 
-/** All vehicles, where there are several: which one is shown, and one press to show another. */
+/** All vehicles, where there are several: which one is shown, and one press to show another; and other stations'. */
 export function FleetStrip() {
-  if (fleet.value.length < 2) return null;
+  const isOne = fleet.value.length < 2;
+  if (isOne && stations.value === null) return null;
   return (
     <nav class="fleet" aria-label="Vehicles" data-testid="fleet">
-      <Rows />
+      {!isOne && <Rows />}
       <Elsewhere />
+      <OtherStations />
     </nav>
   );
 }

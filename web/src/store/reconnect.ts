@@ -6,6 +6,7 @@ import { forgetHome } from "./home";
 import { forgetObstacles, forgetSensing } from "./obstacles";
 import { forgetMoving } from "./moving";
 import { replay, review } from "./review";
+import { forgetStations } from "./stations";
 import { forgetTraffic } from "./traffic";
 import { forgetTraversability } from "./traversability";
 
@@ -36,6 +37,7 @@ const FORGET: Partial<Record<string, () => void>> = {
   "traffic live": () => forgetTraffic("live"),
   "traffic replay": () => forgetTraffic("replay"),
   traversability: forgetTraversability,
+  stations: forgetStations,
   "obstacles live": () => forgetObstacles("live"),
   "obstacles replay": () => forgetObstacles("replay"),
 };

@@ -15,6 +15,7 @@ import { forgetClock, takeClock } from "./server_clock";
 import { radarFiles, runs } from "./studies";
 import { forgetAsked, takeAnswer, takeSelection, takeView } from "./shared";
 import * as state from "./state";
+import { stations } from "./stations";
 import { traversability } from "./traversability";
 
 /** Takes one message of the stream into the page's state. */
@@ -60,6 +61,9 @@ export function receive(message: ServerMessage): void {
       return;
     case "fleet":
       takeFleet(message);
+      return;
+    case "stations":
+      stations.value = message;
       return;
     case "alarms":
       alarms.value = message.alarms;

@@ -1,0 +1,230 @@
+"""Other stations and their vehicles: shown on every page, and held apart from this station's own. No command crosses.
+
+A position counts at the worse end of its age, for as long as that still says where its vehicle may be; what counts no
+longer is said to count no longer.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+import time
+from collections.abc import Callable, Coroutine, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from server.door.hub import Hub
+from server.flying.apart.nearness import STRAIGHT_S, Flown
+from server.heard.node_states import Nodes
+from server.heard.relay import Relay
+from server.schemas import CheckRow, OtherStationDoc, OtherVehicleDoc, StationsMessage
+from telemetry.bus.bus import Bus
+from telemetry.topics.messages import Topic
+from telemetry.topics.stations import FleetVehicle, OtherVehicle, OwnVehicles, StationsStatus
+from telemetry.topics.vehicle import VehicleState
+
+log = logging.getLogger("hedgehop.flying")
+
+OLD_S, COUNTS_S = 3.0, 30.0
+"""A position that is older is shown as old; and one that is older than the second says no more where its vehicle is."""
+UNCOMPARED_S = 10.0
+"""Added to the age of what came from a station whose clock was not compared yet."""
+FASTEST_M_S = 15.0
+"""Of a vehicle that tells no velocity: so fast it may fly, anywhere."""
+TELL_EVERY_S, SHOW_EVERY_S, SILENT_S = 0.2, 0.5, 3.0
+_NODE_SILENT = (
+    "The stations node does not answer: other stations are neither seen nor told anything. Own vehicles are not "
+    "affected. It is started again by itself."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Meeting:
+    """Who this station is among others, and where it meets them."""
+
+    name: str
+    routers: tuple[str, ...]
+    file: Path
+
+
+class OtherStations:
+    """All methods belong to the event loop. Everything that it hears is on the first vehicle's bus."""
+
+    def __init__(
+        self,
+        meeting: Meeting,
+        bus: Bus,
+        nodes: Nodes,
+        hub: Hub,
+        own: Callable[[], Sequence[FleetVehicle]],
+        *,
+        now_mono_s: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._meeting, self._bus, self._nodes, self._hub, self._own = meeting, bus, nodes, hub, own
+        self._now_mono_s = now_mono_s
+        self.status: StationsStatus | None = None
+
+    def loops(self) -> list[Coroutine[Any, Any, None]]:
+        relay = Relay(self._bus)
+        relay.on(Topic.STATIONS, self.on_status)
+        return [*relay.loops(), self._start(), self._tell(), self._show()]
+
+    def on_status(self, status: StationsStatus) -> None:
+        before, self.status = self.status, status
+        was = {station.name: station.state for station in before.stations} if before else {}
+        for station in status.stations:
+            if station.state != was.get(station.name, station.state):
+                log.warning("%s", station.text or f"{station.name} is heard again.")
+        if {station.name: station.state for station in status.stations} != was:
+            self._hub.publish(self.message())
+
+    def flown(self, now_s: float) -> list[Flown]:
+        """In the air, each from where it was at the earliest."""
+        return [_flown(other) for other in self._vehicles if other.it.in_air and counts(other, now_s)]
+
+    def row(self) -> CheckRow:
+        """Of the check before a start: where another station's vehicle will be, nothing tells here."""
+        now_s, status = self._now_mono_s(), self.status
+        if status is None or status.router == "lost" or now_s - status.t_mono_s > SILENT_S:
+            return _row("accept", "Other stations are not heard: whether their vehicles fly is not known.")
+        if lost := [station.name for station in status.stations if station.state == "lost"]:
+            return _row("accept", f"{', '.join(lost)}: not heard, and whether its vehicles fly is not known.")
+        if flies := [_name(other) for other in status.vehicles if other.it.in_air]:
+            return _row("accept", f"In the air, and no plan tells where it will be: {', '.join(flies)}.")
+        return _row("good", "No vehicle of another station that is heard is in the air.")
+
+    def message(self) -> StationsMessage:
+        now_s, status = self._now_mono_s(), self.status
+        if status is None:
+            return StationsMessage(
+                station=self._meeting.name,
+                router="lost",
+                text="Other stations are being looked for.",
+                stations=[],
+                refused=0,
+            )
+        silent = now_s - status.t_mono_s > SILENT_S
+        return StationsMessage(
+            station=self._meeting.name,
+            router="lost" if silent else status.router,
+            text=_NODE_SILENT if silent else status.text,
+            stations=[
+                OtherStationDoc(
+                    name=station.name,
+                    state="lost" if silent else station.state,
+                    silent_s=max(0.0, now_s - station.heard_t_mono_s),
+                    round_trip_s=station.round_trip_s,
+                    clock_ahead_s=station.clock_ahead_s,
+                    text=station.text,
+                    vehicles=[_doc(other, now_s) for other in status.vehicles if other.station == station.name],
+                )
+                for station in status.stations
+            ],
+            refused=status.refused,
+        )
+
+    @property
+    def _vehicles(self) -> tuple[OtherVehicle, ...]:
+        return () if self.status is None else self.status.vehicles
+
+    async def _start(self) -> None:
+        await self._nodes.stations(self._meeting.name, self._meeting.routers, self._meeting.file)
+
+    async def _tell(self) -> None:
+        while True:
+            self._bus.publish(Topic.STATIONS_OWN, OwnVehicles(self._now_mono_s(), tuple(self._own())))
+            await asyncio.sleep(TELL_EVERY_S)
+
+    async def _show(self) -> None:
+        while True:
+            self._hub.publish(self.message())
+            await asyncio.sleep(SHOW_EVERY_S)
+
+
+def age_s(other: OtherVehicle, now_s: float) -> float | None:
+    """Of its position, at the worse end; None: it has none."""
+    if other.it.position_t_mono_s is None:
+        return None
+    if other.oldest_t_mono_s is None:
+        return max(0.0, now_s - other.it.position_t_mono_s) + UNCOMPARED_S
+    return max(0.0, now_s - other.oldest_t_mono_s)
+
+
+def counts(other: OtherVehicle, now_s: float) -> bool:
+    """Whether it is held apart from others."""
+    age = age_s(other, now_s)
+    return age is not None and age <= COUNTS_S
+
+
+def _row(state: Literal["accept", "good"], text: str) -> CheckRow:
+    mend = "" if state == "good" else "Agree with whoever flies there."
+    return CheckRow(code="others", state=state, text=text, mend=mend)
+
+
+def _name(other: OtherVehicle) -> str:
+    return f"{other.it.name} ({other.station} {other.it.number})"
+
+
+def _flown(other: OtherVehicle) -> Flown:
+    """It may be where it was told at the earliest of the times that are possible, or at the latest."""
+    it = other.it
+    compared = other.oldest_t_mono_s is not None
+    likely_s = it.position_t_mono_s or 0.0
+    oldest_s = other.oldest_t_mono_s if other.oldest_t_mono_s is not None else likely_s - UNCOMPARED_S
+    unsure_s = other.unsure_s if compared else UNCOMPARED_S
+    east_m_s, north_m_s, up_m_s = it.v_enu_m_s or (0.0, 0.0, 0.0)
+    unsure_m = math.hypot(east_m_s, north_m_s, up_m_s) * unsure_s
+    if it.v_enu_m_s is None:
+        unsure_m = FASTEST_M_S * (COUNTS_S + STRAIGHT_S)
+    state = VehicleState(
+        0,
+        0,
+        armed=it.armed,
+        position_t_mono_s=oldest_s,
+        lat_deg=it.lat_deg,
+        lon_deg=it.lon_deg,
+        alt_amsl_m=it.alt_amsl_m,
+        v_east_m_s=east_m_s,
+        v_north_m_s=north_m_s,
+        v_down_m_s=-up_m_s,
+        horizontal_accuracy_m=it.within_m,
+    )
+    return Flown(_name(other), state, None, unsure_m)
+
+
+def _doc(other: OtherVehicle, now_s: float) -> OtherVehicleDoc:
+    it, age = other.it, age_s(other, now_s)
+    return OtherVehicleDoc(
+        number=it.number,
+        name=it.name,
+        age_s=age if other.oldest_t_mono_s is not None else None,
+        is_old=age is None or age > OLD_S,
+        lat_deg=it.lat_deg,
+        lon_deg=it.lon_deg,
+        alt_rel_home_m=it.alt_rel_home_m,
+        alt_amsl_m=it.alt_amsl_m,
+        alt_surface_m=it.alt_surface_m,
+        ground_speed_m_s=None if it.v_enu_m_s is None else math.hypot(*it.v_enu_m_s[:2]),
+        mode=it.mode,
+        armed=it.armed,
+        in_air=it.in_air,
+        link=it.link,
+        battery=it.battery,
+        plan=it.plan,
+        plan_share=it.plan_share,
+        text=" ".join(_words(other, age)),
+    )
+
+
+def _words(other: OtherVehicle, age: float | None) -> Iterator[str]:
+    it = other.it
+    if it.in_air and age is None:
+        yield "It is in the air, and where is not known: it is not held apart from yours."
+    elif it.in_air and age is not None and age > COUNTS_S:
+        yield f"Not seen for {age:.0f} s: it is no longer held apart from yours. Call its pilot."
+    if it.link == "lost":
+        yield f"{other.station} hears nothing of it any more."
+    if it.alarm:
+        yield it.alarm

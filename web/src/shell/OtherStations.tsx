@@ -1,0 +1,57 @@
+import { duration } from "../format";
+import type { OtherStationDoc } from "../messages";
+import { failed, late_s } from "../store/reach";
+import { stations, words, wrong } from "../store/stations";
+import { Icon } from "../ui/Icon";
+
+function Station({ station, isPast }: { station: OtherStationDoc; isPast: boolean }) {
+  const { name, state, silent_s, vehicles } = station;
+  const told = state === "lost" ? `silent for ${duration(silent_s)}` : vehicles.length ? "" : "no vehicle";
+  return (
+    <>
+      {told && (
+        <li class="old" data-testid={`station-${name}`}>
+          <strong>{name}</strong> {told}
+        </li>
+      )}
+      {vehicles.map((vehicle) => (
+        <li
+          key={vehicle.number}
+          class={vehicle.is_old || isPast ? "old" : ""}
+          title={[words(vehicle), vehicle.battery, vehicle.plan, vehicle.text].filter(Boolean).join(". ")}
+          data-testid={`other-${name}-${vehicle.number}`}
+        >
+          <strong>
+            {name}: {vehicle.name}
+          </strong>{" "}
+          {isPast ? "as last heard" : words(vehicle)}
+        </li>
+      ))}
+    </>
+  );
+}
+
+/** Vehicles of other stations, to be looked at: no press commands them. */
+export function OtherStations() {
+  const message = stations.value;
+  if (!message) return null;
+  // Without the server, or behind a slow line, nobody tells what has become of them.
+  const isPast = failed.value === "server" || late_s.value !== null;
+  return (
+    <section class="stations" aria-label="Other stations" data-testid="stations">
+      {wrong.value.map((text) => (
+        <p key={text} class="stations-wrong" role="status">
+          <Icon name="warning" size={16} />
+          <span>{text}</span>
+        </p>
+      ))}
+      {message.stations.length > 0 && (
+        <ul>
+          {message.stations.map((station) => (
+            <Station key={station.name} station={station} isPast={isPast} />
+          ))}
+        </ul>
+      )}
+    </section>
+  );
+}

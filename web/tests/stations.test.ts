@@ -1,0 +1,67 @@
+import { beforeEach, describe, expect, test } from "vitest";
+import type { OtherVehicleDoc, StationsMessage } from "../src/messages";
+import { receive } from "../src/store/reduce";
+import { forgetStations, stations, words, wrong } from "../src/store/stations";
+
+const bee: OtherVehicleDoc = {
+  number: 1,
+  name: "Bee",
+  age_s: 0.44,
+  is_old: false,
+  lat_deg: 47,
+  lon_deg: 8,
+  alt_rel_home_m: 30.4,
+  alt_amsl_m: 530,
+  alt_surface_m: 12.4,
+  ground_speed_m_s: 5.25,
+  mode: "AUTO",
+  armed: true,
+  in_air: true,
+  link: "live",
+  battery: "63 %",
+  plan: "Ridge",
+  plan_share: 0.5,
+  text: "",
+};
+
+const told = (vehicles: OtherVehicleDoc[], more: Partial<StationsMessage> = {}): StationsMessage => ({
+  v: 1,
+  type: "stations",
+  station: "Alpha",
+  router: "connected",
+  text: "",
+  stations: [
+    { name: "Bravo", state: "live", silent_s: 0.2, round_trip_s: 0.4, clock_ahead_s: 0, text: "", vehicles },
+  ],
+  refused: 0,
+  ...more,
+});
+
+beforeEach(forgetStations);
+
+describe("other stations' vehicles", () => {
+  test("age and height come first, each with its unit and from where it counts", () => {
+    expect(words(bee)).toBe("0.4\u00a0s old · 12\u00a0m above ground · 5.3\u00a0m/s · AUTO · armed");
+    expect(words({ ...bee, alt_surface_m: null })).toContain("30\u00a0m above its home");
+    expect(words({ ...bee, alt_surface_m: null, alt_rel_home_m: null })).toContain("530\u00a0m AMSL");
+    expect(words({ ...bee, alt_surface_m: null, alt_rel_home_m: null, alt_amsl_m: null })).toContain(
+      "height ?",
+    );
+  });
+
+  test("what is not known is not shown as fresh", () => {
+    expect(words({ ...bee, age_s: null })).toContain("age ?");
+    expect(words({ ...bee, age_s: null, lat_deg: null })).toContain("no position");
+    expect(words({ ...bee, age_s: 31.6 })).toContain("32\u00a0s old");
+  });
+
+  test("what is wrong is told, the way to all of them first", () => {
+    receive(
+      told([{ ...bee, text: "Not seen for 45 s." }], { text: "The router does not answer.", router: "lost" }),
+    );
+    expect(wrong.value).toEqual(["The router does not answer.", "Bee (Bravo 1): Not seen for 45 s."]);
+    receive(told([bee]));
+    expect(wrong.value).toEqual([]);
+    expect(stations.value?.stations[0]?.vehicles).toEqual([bee]);
+  });
+});
