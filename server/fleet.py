@@ -83,7 +83,10 @@ class Fleet:
             {actor_of("live", f.number): f.name for f in flights} if len(flights) > 1 else {},
         )
         self._airspace = Airspace(
-            workspace.traffic_stage, [(f.live, f.traffic) for f in flights], (self._replay, shared.replayed.traffic)
+            workspace.traffic_stage,
+            [(f.live, f.traffic) for f in flights],
+            (self._replay, shared.replayed.traffic),
+            self._stations,
         )
 
     @classmethod

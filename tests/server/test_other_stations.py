@@ -83,7 +83,8 @@ def test_it_is_held_apart_at_the_worse_end_of_its_age_and_speed() -> None:
     assert Desk(other(100.0, east_m_s=-10.0, age_s=8.0)).near_m() == 0.0
     # Of one that tells no speed, or whose clock was not compared, more has to be taken.
     assert Desk(other(300.0, east_m_s=None)).near_m() == 0.0
-    assert Desk(other(200.0, east_m_s=10.0, age_s=None)).near_m() < Desk(other(200.0, east_m_s=10.0)).near_m() - 90.0
+    assert Desk(other(200.0, east_m_s=10.0, age_s=None)).near_m() < Desk(other(200.0, east_m_s=10.0)).near_m() - 20.0
+    assert Desk(other(200.0, east_m_s=-10.0, age_s=None)).near_m() == 0.0
 
 
 def test_at_an_unknown_height_it_is_at_ours() -> None:

@@ -174,7 +174,7 @@ def test_what_is_dangerous_old_or_without_a_height_says_so() -> None:
 def test_aircraft_stand_at_the_vehicles_height_and_each_is_drawn_once() -> None:
     drawing, placing = placed()
     shown: list[list[PlacedAircraft]] = []
-    stage: Any = SimpleNamespace(dsm=drawing.dsm, drawing=drawing, show=lambda those: shown.append(list(those)))
+    stage: Any = SimpleNamespace(dsm=drawing.dsm, drawing=drawing, show=lambda those, _: shown.append(list(those)))
     home = placing.origin
     state = VehicleState(
         1, 1, lat_deg=home.lat_deg, lon_deg=home.lon_deg, alt_rel_home_m=30.0, home_lat_deg=home.lat_deg,

@@ -1,15 +1,18 @@
-"""Puts other aircraft into the 3D view, twice a second: those that any of the station's vehicles is told of."""
+"""Puts other aircraft into the 3D view, twice a second: those that any vehicle is told of, and other stations'."""
 
 from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from mapping.geometry.frames import moved_deg
 from server.errors import reported
+from server.flying.apart.other_stations import OtherStations
+from server.flying.apart.others_placed import placed_vehicles
 from server.heard.channel import Channel
 from server.heard.vehicle_place import Placer
 from server.obstacles.traffic import TrafficWatch
@@ -25,8 +28,14 @@ Around = tuple[Channel, TrafficWatch]
 class Airspace:
     """While a recording has traffic it is drawn instead of the live one."""
 
-    def __init__(self, stage: TrafficStage | None, live: Sequence[Around], replay: Around) -> None:
-        self._stage, self._live, self._replay = stage, live, replay
+    def __init__(
+        self,
+        stage: TrafficStage | None,
+        live: Sequence[Around],
+        replay: Around,
+        stations: OtherStations | None = None,
+    ) -> None:
+        self._stage, self._live, self._replay, self._stations = stage, live, replay, stations
         self._placer: Placer | None = None
         self._drawn: tuple[object, ...] = ()
 
@@ -47,8 +56,11 @@ class Airspace:
         if self._placer is None or self._placer.dsm is not stage.dsm:
             self._placer = Placer(stage.dsm)
         shown = [self._replay] if self._replay[1].status is not None else self._live
-        key = (stage.drawing, *(watch.status for _, watch in shown))
-        if len(key) == len(self._drawn) and all(a is b for a, b in zip(key, self._drawn, strict=True)):
+        stations = self._stations.status if self._stations is not None and shown is self._live else None
+        key = (stage.drawing, stations, *(watch.status for _, watch in shown))
+        # Others grow old also where nothing new comes of them.
+        is_same = len(key) == len(self._drawn) and all(a is b for a, b in zip(key, self._drawn, strict=True))
+        if is_same and (stations is None or not stations.vehicles):
             return
         self._drawn = key
         # Two vehicles hear the same aircraft: the newer word of it counts.
@@ -58,7 +70,9 @@ class Airspace:
                 known = newest.get(placed.it.key)
                 if known is None or placed.it.age_s < known.it.age_s:
                     newest[placed.it.key] = placed
-        stage.show(sorted(newest.values(), key=lambda placed: (not placed.it.conflict, placed.it.distance_m or 0.0)))
+        others = () if stations is None else placed_vehicles(stations.vehicles, stage.dsm, time.monotonic())
+        aircraft = sorted(newest.values(), key=lambda placed: (not placed.it.conflict, placed.it.distance_m or 0.0))
+        stage.show(aircraft, tuple(others))
 
 
 def _placed(channel: Channel, watch: TrafficWatch, placer: Placer) -> Iterator[PlacedAircraft]:

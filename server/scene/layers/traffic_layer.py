@@ -14,6 +14,7 @@ from server.scene.geometry import palette
 from server.scene.geometry.canvas import Canvas, Node
 from server.scene.geometry.mark_shapes import dots_node, label_node, line_node, raised
 from server.scene.geometry.stage import Drawing
+from server.scene.layers.other_stations_layer import PlacedVehicle, other_vehicle_nodes
 from telemetry.topics.traffic import OLD_S, Aircraft
 
 LINE_S = 15.0
@@ -51,8 +52,11 @@ class TrafficStage:
         """Another model, frame or choice of layers; the aircraft are drawn again at the next turn."""
         self.drawing = drawing
 
-    def show(self, aircraft: Sequence[PlacedAircraft]) -> None:
-        nodes = [] if self.drawing is None else traffic_nodes(self.drawing, aircraft)
+    def show(self, aircraft: Sequence[PlacedAircraft], others: Sequence[PlacedVehicle] = ()) -> None:
+        """``others``: vehicles of other stations."""
+        nodes = list[Node]()
+        if self.drawing is not None:
+            nodes = [*traffic_nodes(self.drawing, aircraft), *other_vehicle_nodes(self.drawing, others)]
         if nodes or self._is_drawn:
             self._canvas.draw({"traffic": nodes})
         self._is_drawn = bool(nodes)
