@@ -9,6 +9,7 @@ import signal
 from contextlib import AsyncExitStack
 from pathlib import Path
 
+import pytest
 import zenoh
 
 from server.door.certificates import CertificateFiles, Names, now_utc
@@ -16,10 +17,13 @@ from telemetry.stations.keys import beacon_key, vehicle_key
 from telemetry.stations.other import LOST_S
 from telemetry.stations.summary import encode, vehicle_wire
 from telemetry.topics.stations import FleetVehicle, StationsStatus
+from tests.telemetry.bad_line import Bad
 from tests.telemetry.bus_runs import run, short_folder
 from tests.telemetry.station_fleet import Field, true_age_s
+from tests.telemetry.stations_bench import ROUND_S, measure
 
-ROUND_S = 2e-3
+pytestmark = [pytest.mark.xdist_group("real-time"), pytest.mark.slow]
+
 NAMES = ("Alpha", "Bravo", "Charlie")
 
 
@@ -115,6 +119,16 @@ def test_without_a_certificate_of_the_authority_nobody_comes_in() -> None:
             assert alpha.statuses[-1].stations == ()
 
     _in_folder(whole)
+
+
+def test_over_bad_lines_no_age_is_told_too_young_and_a_vehicle_stays_within_its_budget() -> None:
+    """``stations_bench`` in short."""
+    with short_folder() as folder:
+        result = run(lambda: measure(folder, stations=2, vehicles=3, seconds=5.0, bad=Bad()))
+    assert len(result.ages_s)
+    assert (result.told_s >= result.ages_s - ROUND_S).all()
+    assert 0.0 < max(result.up_bytes_per_s, result.down_bytes_per_s) < 2000.0
+    assert (result.mixed_up, result.refused) == (0, 0)
 
 
 def _ages_are_true(status: StationsStatus) -> None:
