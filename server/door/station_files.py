@@ -53,6 +53,13 @@ def write_station_files(
         raise StationsError(
             "Two of the stations' names differ in capitals only.", where=", ".join(every), advice="Rename one of them."
         )
+    for name in there:
+        if read_common_name(out / f"{name}{_SUFFIX}") != name:
+            raise StationsError(
+                f"{name}{_SUFFIX} is no file of a station of that name.",
+                where=str(out),
+                advice="Choose a folder for these files alone.",
+            )
     for name in every:
         path = out / f"{name}{_SUFFIX}"
         if name in there and not read_certificate(path).ends_soon(now_utc):

@@ -75,6 +75,13 @@ def test_what_is_no_name_is_refused_before_anything_is_written(tmp_path: Path, n
     assert not list((tmp_path / "fleet").glob("*"))
 
 
+def test_a_folder_with_other_certificates_is_left_as_it_is(tmp_path: Path) -> None:
+    write_station_files(tmp_path / "fleet", CertificateFiles(tmp_path), ["Alpha"], ["router.example"], now_utc())
+    done = hedgehop("stations", "router.example", "--station", "Bravo", "--out", tmp_path / "tls")
+    assert (done.code, "authority.pem is no file of a station" in done.err) == (2, True)
+    assert {path.name for path in (tmp_path / "tls").iterdir()} == {"authority.pem", "authority.key"}
+
+
 def test_names_that_differ_in_capitals_only_are_refused(tmp_path: Path) -> None:
     done = hedgehop("stations", "router.example", "--station", "Alpha", "--station", "ALPHA", "--out", tmp_path)
     assert done.code == 2
