@@ -37,7 +37,7 @@ from server.work.jobs import Lane
 from server.workspace import Workspace
 from telemetry.bus.node_lock import running_nodes
 from telemetry.topics.messages import Topic
-from telemetry.topics.stations import FleetVehicle
+from telemetry.topics.station_vehicles import FleetVehicle
 
 TELL_EVERY_S = 0.2
 

@@ -17,7 +17,7 @@ from pydantic_settings import (
 
 from server.errors import StartError, error_doc
 from telemetry.errors import StationsError
-from telemetry.stations.keys import router_endpoint
+from telemetry.stations.station_names import router_endpoint
 from telemetry.topics.vehicle import RadarKind
 
 GIB = 1024**3

@@ -16,8 +16,8 @@ from server.door.certificates import CertificateFiles, Names, read_certificate, 
 from server.errors import StartError
 from server.library.whole_files import storage_errors, write_atomically
 from telemetry.errors import StationsError
-from telemetry.stations.keys import ROUTER_PORT, checked_name
 from telemetry.stations.router_file import router_file
+from telemetry.stations.station_names import ROUTER_PORT, checked_name
 
 ROUTER_FILE, _SUFFIX = "router.json5", ".pem"
 _BEGIN = "-----BEGIN "

@@ -17,13 +17,13 @@ from pathlib import Path
 from telemetry.bus.bus import Bus
 from telemetry.bus.node import LOOK_EVERY_S, NodeContext, run_node
 from telemetry.errors import StationsError
-from telemetry.stations.keys import beacon_key, checked_name, vehicle_key
 from telemetry.stations.roster import Roster
-from telemetry.stations.summary import encode
-from telemetry.stations.telling import Telling
-from telemetry.stations.wire import Route, Wire
+from telemetry.stations.router_wire import Route, Wire
+from telemetry.stations.station_messages import encode
+from telemetry.stations.station_names import beacon_key, checked_name, vehicle_key
+from telemetry.stations.when_told import Telling
 from telemetry.topics.messages import Topic
-from telemetry.topics.stations import OwnVehicles, StationsStatus
+from telemetry.topics.station_vehicles import OwnVehicles, StationsStatus
 
 _log = logging.getLogger(__name__)
 

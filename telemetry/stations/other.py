@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 
 from telemetry.errors import StationsError
-from telemetry.stations.clocks import DRIFT, Clocks
-from telemetry.stations.summary import BeaconWire, HeardWire, VehicleWire, vehicle_of
-from telemetry.topics.stations import OtherStation, OtherVehicle
+from telemetry.stations.compared_clocks import DRIFT, Clocks
+from telemetry.stations.station_messages import BeaconWire, HeardWire, VehicleWire, vehicle_of
+from telemetry.topics.station_vehicles import OtherStation, OtherVehicle
 
 LOST_S = 4.0
 """It sends once a second and more; a packet that is lost costs a second at most."""

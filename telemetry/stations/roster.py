@@ -6,10 +6,10 @@ import math
 from collections import deque
 
 from telemetry.errors import StationsError
-from telemetry.stations.keys import MOST_STATIONS, Key, read_key
 from telemetry.stations.other import LOST_S, Other
-from telemetry.stations.summary import BEACON_BYTES, VEHICLE_BYTES, BeaconWire, VehicleWire, decode
-from telemetry.topics.stations import OtherStation, OtherVehicle
+from telemetry.stations.station_messages import BEACON_BYTES, VEHICLE_BYTES, BeaconWire, VehicleWire, decode
+from telemetry.stations.station_names import MOST_STATIONS, Key, read_key
+from telemetry.topics.station_vehicles import OtherStation, OtherVehicle
 
 FORGOTTEN_S = 3600.0
 """A station that was not heard for so long is no longer told of."""

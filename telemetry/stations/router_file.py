@@ -11,7 +11,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from telemetry.stations.keys import EVERYTHING, MOST_STATIONS, below
+from telemetry.stations.station_names import EVERYTHING, MOST_STATIONS, below
 
 _SESSIONS = 2 * MOST_STATIONS
 _LARGEST_BYTES = 65_536

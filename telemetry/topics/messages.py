@@ -22,7 +22,7 @@ from telemetry.topics.obstacles import (
     PerceptionSettings,
     PerceptionStatus,
 )
-from telemetry.topics.stations import OwnVehicles, StationsStatus
+from telemetry.topics.station_vehicles import OwnVehicles, StationsStatus
 from telemetry.topics.tracks import TracksStatus
 from telemetry.topics.traffic import TrafficSettings, TrafficStatus
 from telemetry.topics.vehicle import SimTruth, VehicleState

@@ -18,7 +18,7 @@ from server.flying.apart.own_told import fleet_vehicle
 from server.schemas import StationsMessage, VehicleAlarm, VehicleDoc
 from server.stations import Other
 from telemetry.topics.messages import LinkStatus
-from telemetry.topics.stations import FleetVehicle, OtherStation, OtherVehicle, StationsStatus
+from telemetry.topics.station_vehicles import FleetVehicle, OtherStation, OtherVehicle, StationsStatus
 from telemetry.topics.vehicle import VehicleState
 
 HOME = 47.0, 8.0

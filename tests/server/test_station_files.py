@@ -17,7 +17,7 @@ from server.door.station_files import ROUTER_FILE, station_of, write_station_fil
 from server.errors import StartError
 from server.settings import load_settings
 from telemetry.errors import StationsError
-from telemetry.stations.keys import router_endpoint
+from telemetry.stations.station_names import router_endpoint
 from tests.server.cli_runs import hedgehop
 
 

@@ -14,7 +14,7 @@ from server.door.certificates import CertificateFiles, now_utc
 from server.door.station_files import ROUTER_FILE, write_station_files
 from telemetry.bus.bus import Bus
 from telemetry.topics.messages import ServerAlive, Topic
-from telemetry.topics.stations import FleetVehicle, OtherVehicle, OwnVehicles, StationsStatus
+from telemetry.topics.station_vehicles import FleetVehicle, OtherVehicle, OwnVehicles, StationsStatus
 from tests.free_ports import free_port
 
 PATIENCE_S = 90.0

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from telemetry.topics.stations import StationsStatus
+from telemetry.topics.station_vehicles import StationsStatus
 from tests.telemetry.bad_line import Bad, BadLine
 from tests.telemetry.bus_runs import short_folder
 from tests.telemetry.station_fleet import Field, FieldStation, true_age_s

@@ -13,10 +13,10 @@ import pytest
 import zenoh
 
 from server.door.certificates import CertificateFiles, Names, now_utc
-from telemetry.stations.keys import beacon_key, vehicle_key
 from telemetry.stations.other import LOST_S
-from telemetry.stations.summary import encode, vehicle_wire
-from telemetry.topics.stations import FleetVehicle, StationsStatus
+from telemetry.stations.station_messages import encode, vehicle_wire
+from telemetry.stations.station_names import beacon_key, vehicle_key
+from telemetry.topics.station_vehicles import FleetVehicle, StationsStatus
 from tests.telemetry.bad_line import Bad
 from tests.telemetry.bus_runs import run, short_folder
 from tests.telemetry.station_fleet import Field, true_age_s

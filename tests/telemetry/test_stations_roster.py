@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from telemetry.stations.clocks import Clocks
-from telemetry.stations.keys import MOST_STATIONS, beacon_key, vehicle_key
+from telemetry.stations.compared_clocks import Clocks
 from telemetry.stations.other import GONE_S, LOST_S
 from telemetry.stations.roster import Roster
-from telemetry.stations.summary import BeaconWire, HeardWire, encode
-from telemetry.stations.telling import CHANGING_S, STILL_S, Telling
-from telemetry.topics.stations import FleetVehicle, OtherVehicle
+from telemetry.stations.station_messages import BeaconWire, HeardWire, encode
+from telemetry.stations.station_names import MOST_STATIONS, beacon_key, vehicle_key
+from telemetry.stations.when_told import CHANGING_S, STILL_S, Telling
+from telemetry.topics.station_vehicles import FleetVehicle, OtherVehicle
 
 TICK_S = 0.1
 

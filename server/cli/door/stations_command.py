@@ -12,7 +12,7 @@ from server.cli.shared.output import say
 from server.door.certificates import CertificateFiles, now_utc
 from server.door.station_files import ROUTER_FILE, write_station_files
 from server.settings import load_settings
-from telemetry.stations.keys import ROUTER_PORT
+from telemetry.stations.station_names import ROUTER_PORT
 
 
 @command

@@ -22,7 +22,7 @@ from server.heard.relay import Relay
 from server.schemas import CheckRow, OtherStationDoc, OtherVehicleDoc, StationsMessage
 from telemetry.bus.bus import Bus
 from telemetry.topics.messages import Topic
-from telemetry.topics.stations import FleetVehicle, OtherVehicle, OwnVehicles, StationsStatus
+from telemetry.topics.station_vehicles import FleetVehicle, OtherVehicle, OwnVehicles, StationsStatus
 from telemetry.topics.vehicle import VehicleState
 
 log = logging.getLogger("hedgehop.flying")

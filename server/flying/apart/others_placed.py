@@ -11,7 +11,7 @@ from planning.terrain.dsm import Dsm
 from planning.terrain.vertical_datum import is_amsl
 from server.flying.apart.other_stations import OLD_S, age_s
 from server.scene.layers.other_stations_layer import AHEAD_S, PlacedVehicle
-from telemetry.topics.stations import FleetVehicle, OtherVehicle
+from telemetry.topics.station_vehicles import FleetVehicle, OtherVehicle
 
 
 def placed_vehicles(vehicles: Sequence[OtherVehicle], dsm: Dsm, now_s: float) -> Iterator[PlacedVehicle]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from server.heard.channel import Channel
 from server.schemas import VehicleDoc
 from telemetry.topics.messages import LinkStatus
-from telemetry.topics.stations import FleetVehicle
+from telemetry.topics.station_vehicles import FleetVehicle
 
 
 def fleet_vehicle(doc: VehicleDoc, channel: Channel, link: LinkStatus | None) -> FleetVehicle:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from telemetry.stations.keys import MOST_VEHICLES
-from telemetry.stations.summary import VehicleWire, vehicle_wire
-from telemetry.topics.stations import FleetVehicle
+from telemetry.stations.station_messages import VehicleWire, vehicle_wire
+from telemetry.stations.station_names import MOST_VEHICLES
+from telemetry.topics.station_vehicles import FleetVehicle
 
 CHANGING_S, STILL_S = 0.5, 2.0
 _SLACK_S = 0.02

@@ -12,8 +12,8 @@ from typing import Annotated, TypeVar
 import msgspec
 
 from telemetry.errors import StationsError
-from telemetry.stations.keys import MOST_STATIONS
-from telemetry.topics.stations import FleetVehicle, VehicleLink
+from telemetry.stations.station_names import MOST_STATIONS
+from telemetry.topics.station_vehicles import FleetVehicle, VehicleLink
 
 VEHICLE_BYTES, BEACON_BYTES = 500, 4096
 """Longer ones are refused unread: two of a vehicle in a second, with all that TLS and TCP add, stay under 2 kB."""

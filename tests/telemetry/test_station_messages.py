@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from telemetry.errors import StationsError
-from telemetry.stations.keys import Key, below, checked_name, read_key, vehicle_key
-from telemetry.stations.summary import (
+from telemetry.stations.station_messages import (
     BEACON_BYTES,
     VEHICLE_BYTES,
     BeaconWire,
@@ -25,7 +24,8 @@ from telemetry.stations.summary import (
     vehicle_of,
     vehicle_wire,
 )
-from telemetry.topics.stations import FleetVehicle
+from telemetry.stations.station_names import Key, below, checked_name, read_key, vehicle_key
+from telemetry.topics.station_vehicles import FleetVehicle
 
 BEE = FleetVehicle(
     number=3,

@@ -18,9 +18,9 @@ from typing import Any
 import zenoh
 
 from telemetry.errors import StationsError
-from telemetry.stations.keys import EVERYTHING, MOST_STATIONS, MOST_VEHICLES
 from telemetry.stations.router_file import LEASE_MS
-from telemetry.stations.summary import BEACON_BYTES
+from telemetry.stations.station_messages import BEACON_BYTES
+from telemetry.stations.station_names import EVERYTHING, MOST_STATIONS, MOST_VEHICLES
 
 CONNECT_S = 3.0
 _MOST_WAITING = MOST_STATIONS * (MOST_VEHICLES + 1)
