@@ -46,6 +46,8 @@ def write_station_files(
     with storage_errors(out):
         out.mkdir(mode=0o700, parents=True, exist_ok=True)
         there = sorted(path.stem for path in out.glob(f"*{_SUFFIX}"))
+    router_key, router_chain = authority.issue("Hedgehop router", now_utc, reached)
+    router_leaf, above = _parts(router_chain.decode())
     made, kept = list[Path](), list[Path]()
     every = sorted({checked_name(name) for name in [*names, *there]})
     folded = {name.casefold() for name in every}
@@ -62,19 +64,17 @@ def write_station_files(
             )
     for name in every:
         path = out / f"{name}{_SUFFIX}"
-        if name in there and not read_certificate(path).ends_soon(now_utc):
+        if name in there and _is_of(path, above) and not read_certificate(path).ends_soon(now_utc):
             kept.append(path)
             continue
         key, chain = authority.issue(name, now_utc)
         write_atomically(path, key + chain)
         made.append(path)
-    key, chain = authority.issue("Hedgehop router", now_utc, reached)
-    leaf, above = _parts(chain.decode())
     text = router_file(
         every,
         authority_pem=above.encode(),
-        certificate_pem=leaf.encode(),
-        key_pem=key,
+        certificate_pem=router_leaf.encode(),
+        key_pem=router_key,
         listen=listen,
     )
     write_atomically(out / ROUTER_FILE, text.encode())
@@ -94,6 +94,11 @@ def station_of(path: Path) -> str:
             where=f"{path} (setting stations_file)",
             advice="Make it with hedgehop stations, and name it as a path that this user may read.",
         ) from error
+
+
+def _is_of(path: Path, authority_pem: str) -> bool:
+    """Whether a station's file was made by this authority, and not by one before it."""
+    return _parts(path.read_text(encoding="ascii"))[-1].strip() == authority_pem.strip()
 
 
 def _parts(pem: str) -> list[str]:

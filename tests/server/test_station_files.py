@@ -67,6 +67,18 @@ def test_files_that_end_soon_are_made_anew(tmp_path: Path) -> None:
     assert (written.kept, [path.name for path in written.made]) == ([], ["Alpha.pem", ROUTER_FILE])
 
 
+def test_files_of_another_authority_are_made_anew(tmp_path: Path) -> None:
+    """They would be refused at the router, whose file trusts the one of this machine alone."""
+    out = tmp_path / "fleet"
+    write_station_files(out, CertificateFiles(tmp_path / "before"), ["Alpha", "Bravo"], ["router.example"], now_utc())
+    before = (out / "Alpha.pem").read_bytes()
+    written = write_station_files(out, CertificateFiles(tmp_path / "now"), ["Bravo"], ["router.example"], now_utc())
+    assert ([path.name for path in written.made], written.kept) == (["Alpha.pem", "Bravo.pem", ROUTER_FILE], [])
+    assert (out / "Alpha.pem").read_bytes() != before
+    for name in ("Alpha", "Bravo"):
+        assert (out / f"{name}.pem").read_text().endswith((tmp_path / "now" / "tls" / "authority.pem").read_text())
+
+
 @pytest.mark.parametrize("name", ["", "*", "../up", "a b", "Älpha", "x" * 25])
 def test_what_is_no_name_is_refused_before_anything_is_written(tmp_path: Path, name: str) -> None:
     done = hedgehop("stations", "router.example", "--station", name, "--out", tmp_path / "fleet")
