@@ -160,7 +160,7 @@ class Fleet:
             *self._relay().loops(),
             self._hear_of_plan(),
             *([self._tell(), self._nearness.run(), self._others.run()] if self._has_others else []),
-            *([] if self._stations is None else self._stations.loops()),
+            *([self.first.nodes.no_stations()] if self._stations is None else self._stations.loops()),
             self.recordings.run(),
             self._scenery.run(),
             self._airspace.run(),

@@ -25,6 +25,7 @@ STATIONS = "stations"
 _SENSOR_SEED = 1
 _RETURN_HEIGHT: dict[DemoAutopilot, str] = {"ardupilot": "RTL_ALT={1:.0f}", "px4": "RTL_RETURN_ALT={0:.2f}"}
 """For metres and centimetres above home."""
+_LOOK_AGAIN_S = 0.5
 _CALL_TIMEOUT_S = 15.0
 """Of a node that has been up, on a busy machine."""
 
@@ -116,6 +117,12 @@ class Nodes:
         """Vehicles of other stations, met at a router."""
         arguments = [part for router in routers for part in ("--router", router)]
         await self.supervisor.start(STATIONS, ["--station", name, *arguments, "--file", str(file.absolute())])
+
+    async def no_stations(self) -> None:
+        """Ends one that a server before this one, which met other stations, has left running."""
+        while await asyncio.to_thread(running_node, self._runtime_dir, STATIONS) is not None:
+            await self.supervisor.stop(STATIONS)
+            await asyncio.sleep(_LOOK_AGAIN_S)  # it is not taken over yet
 
     async def simulated_sensors(self, ground: Ground, world: Path) -> None:
         """Radar, camera and its pose, of the simulated vehicle in its world."""

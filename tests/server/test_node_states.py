@@ -1,4 +1,4 @@
-"""How long is waited for a node: it may have to load what it needs first."""
+"""How long is waited for a node, which may have to load what it needs first; and what is done with one left behind."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any, cast
 
 import pytest
 
+from server.heard import node_states
 from server.heard.node_states import _CALL_TIMEOUT_S, Nodes
 from server.work.supervisor import NodeState, State
 from telemetry.bus.liveness import START_S
@@ -58,3 +59,21 @@ def test_one_that_still_loads_is_waited_for_as_long_as_it_may_load(
 
     asyncio.run(whole())
     assert bus.patience_s == [patience_s, patience_s]
+
+
+def test_a_node_that_an_earlier_server_left_running_is_ended_where_no_stations_are_met(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """It would go on telling others of vehicles, under a name that this server does not have."""
+    nodes = Nodes(cast(Any, None), tmp_path, tmp_path, Told())
+    running, stopped = [True], list[str]()
+
+    async def stop(name: str) -> None:
+        stopped.append(name)
+        running[0] = len(stopped) < 3  # at first it is not taken over yet
+
+    monkeypatch.setattr(nodes.supervisor, "stop", stop)
+    monkeypatch.setattr(node_states, "_LOOK_AGAIN_S", 0.0)
+    monkeypatch.setattr(node_states, "running_node", lambda folder, name: name if running[0] else None)
+    asyncio.run(nodes.no_stations())
+    assert stopped == ["stations"] * 3
