@@ -28,6 +28,9 @@ from telemetry.topics.station_vehicles import OwnVehicles, StationsStatus
 _log = logging.getLogger(__name__)
 
 TURN_S, BEACON_S, STATUS_S, AGAIN_S = 0.1, 1.0, 0.5, 1.0
+KNOWS_S = 10.0
+"""Without the server's word for so long this node says nothing: what it said before may be true no more. A server that
+starts again is back sooner."""
 
 
 class StationsNode:
@@ -40,6 +43,7 @@ class StationsNode:
         self._own = OwnVehicles(0.0)
         self._wire: Wire | None = None
         self._fault = ""
+        self._since_s: float | None = None
         self._told: StationsStatus | None = None
 
     async def run(self) -> None:
@@ -77,6 +81,9 @@ class StationsNode:
         beacon_s = 0.0
         while True:
             now_s = time.monotonic()
+            if now_s - self._own.t_mono_s > KNOWS_S:
+                await asyncio.sleep(TURN_S)
+                continue
             if now_s - beacon_s >= BEACON_S:
                 beacon_s = now_s
                 beacon = self._roster.beacon(len(self._own.vehicles), now_s=now_s, now_utc_s=time.time())
@@ -94,7 +101,7 @@ class StationsNode:
             for key, (payload, came_s) in waiting.items():
                 self._roster.on_message(key, payload, now_s=came_s, now_utc_s=came_s + utc_less_mono_s)
             if refused:
-                self._roster.refuse("Messages were too long, or under more names than are kept.", refused)
+                self._roster.refuse_unread(refused, time.monotonic())
 
     async def _watch_router(self, wire: Wire) -> None:
         where = ", ".join(self._route.routers)
@@ -124,14 +131,17 @@ class StationsNode:
     def _status(self) -> StationsStatus:
         now_s, roster = time.monotonic(), self._roster
         connected = self._wire is not None and not self._fault
+        self._since_s = (self._since_s or now_s) if connected else None
         text = self._fault or ("" if connected else "The router is being looked for.")
-        if roster.has_namesake(now_s):
-            text = f"Another station calls itself {self._station}, too. Give one of them another name. {text}".strip()
+        leaves_out = roster.leaves_out(now_s)
+        text = f"{leaves_out} {text}".strip()
         return StationsStatus(
             t_mono_s=now_s,
             station=self._station,
             router="connected" if connected else "lost",
             text=text,
+            listens_since_t_mono_s=self._since_s,
+            leaves_out=leaves_out,
             stations=roster.stations(now_s, time.time()),
             vehicles=roster.vehicles(now_s),
             refused=roster.refused,

@@ -15,7 +15,7 @@ from telemetry.topics.station_vehicles import OtherStation, OtherVehicle
 LOST_S = 4.0
 """It sends once a second and more; a packet that is lost costs a second at most."""
 GONE_S = 300.0
-"""A vehicle that was not heard for so long is no longer told of."""
+"""A vehicle that stood and was not heard for so long is no longer told of."""
 CLOCKS_PART_S = 1.0
 _ANSWERS_S = 10.0
 """It should have said by then that it hears us."""
@@ -46,6 +46,11 @@ class Other:
         self._utc_less_mono_s = 0.0
         self._clocks = Clocks()
         self._vehicles: dict[int, _Heard] = {}
+
+    @property
+    def was_flying(self) -> bool:
+        """A vehicle of it was in the air when it was last heard of."""
+        return any(heard.wire.flags & 2 for heard in self._vehicles.values())
 
     def newest(self, now_s: float) -> HeardWire | None:
         """Of its beacons, for an answer; None: there is none from this moment."""
@@ -109,12 +114,15 @@ class Other:
             clock_ahead_s=ahead_s,
             clock_within_s=within_s,
             hears_us=hears_us and not is_lost,
+            is_double=now_s - self._twice_s < _TWICE_S,
             text=" ".join(self._words(now_s, is_lost, hears_us, ahead_s, within_s or 0.0)),
         )
 
     def vehicles(self, now_s: float) -> list[OtherVehicle]:
-        for number in [number for number, heard in self._vehicles.items() if now_s - heard.came_s > GONE_S]:
-            del self._vehicles[number]
+        gone = [number for number, heard in self._vehicles.items() if now_s - heard.came_s > GONE_S]
+        for number in gone:
+            if not self._vehicles[number].wire.flags & 2:
+                del self._vehicles[number]
         return [self._vehicle(number, now_s) for number in sorted(self._vehicles)]
 
     def _vehicle(self, number: int, now_s: float) -> OtherVehicle:

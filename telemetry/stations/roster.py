@@ -11,10 +11,8 @@ from telemetry.stations.station_messages import BEACON_BYTES, VEHICLE_BYTES, Bea
 from telemetry.stations.station_names import MOST_STATIONS, Key, read_key
 from telemetry.topics.station_vehicles import OtherStation, OtherVehicle
 
-FORGOTTEN_S = 3600.0
-"""A station that was not heard for so long is no longer told of."""
 _BEACONS_KEPT = 128
-_NAMESAKE_S = 30.0
+_LATELY_S = 30.0
 
 
 class Roster:
@@ -25,7 +23,8 @@ class Roster:
         self._others: dict[str, Other] = {}
         self._beacons = 0
         self._sent_us: deque[int] = deque(maxlen=_BEACONS_KEPT)
-        self._namesake_s = -math.inf
+        self._namesake_s = self._too_many_s = self._overflow_s = -math.inf
+        self._not_understood: set[str] = set()
         self.refused, self.refused_last = 0, ""
 
     def on_message(self, key: str, payload: bytes, *, now_s: float, now_utc_s: float) -> None:
@@ -34,6 +33,11 @@ class Roster:
             self._take(key, payload, now_s, now_utc_s)
         except StationsError as error:
             self.refuse(error.what)
+
+    def refuse_unread(self, times: int, now_s: float) -> None:
+        """Whose they were is not known."""
+        self._overflow_s = now_s
+        self.refuse("Messages were too long, or under more names than are kept.", times)
 
     def refuse(self, why: str, times: int = 1) -> None:
         self.refused += times
@@ -48,26 +52,29 @@ class Roster:
         return BeaconWire(self._run, self._beacons, sent_us, utc_ms, min(vehicles, 999), tuple(heard))
 
     def stations(self, now_s: float, now_utc_s: float) -> tuple[OtherStation, ...]:
-        for name in [name for name, other in self._others.items() if now_s - other.heard_s > FORGOTTEN_S]:
-            del self._others[name]
         return tuple(self._others[name].told(now_s, now_utc_s) for name in sorted(self._others))
 
     def vehicles(self, now_s: float) -> tuple[OtherVehicle, ...]:
         return tuple(each for name in sorted(self._others) for each in self._others[name].vehicles(now_s))
 
-    def has_namesake(self, now_s: float) -> bool:
-        """Another process has lately told something under this station's name."""
-        return now_s - self._namesake_s < _NAMESAKE_S
+    def leaves_out(self, now_s: float) -> str:
+        """Why stations that speak are not among these, and what to do; empty: none that is known of."""
+        if now_s - self._namesake_s < _LATELY_S:
+            return f"Another station calls itself {self._own}, too. Give one of them another name."
+        if now_s - self._too_many_s < _LATELY_S:
+            return f"There are more than {MOST_STATIONS} stations."
+        if now_s - self._overflow_s < _LATELY_S:
+            return "Messages are too long or too many to be heard. Give all stations the same version of Hedgehop."
+        if self._not_understood:
+            names = ", ".join(sorted(self._not_understood))
+            return f"Messages of {names} cannot be understood. Give all stations the same version of Hedgehop."
+        return ""
 
     def _take(self, text: str, payload: bytes, now_s: float, now_utc_s: float) -> None:
         key = read_key(text)
         if key is None:
             raise StationsError("A message came under a name that no station uses.")
-        message: VehicleWire | BeaconWire
-        if key.vehicle is None:
-            message = decode(payload, BeaconWire, BEACON_BYTES)
-        else:
-            message = decode(payload, VehicleWire, VEHICLE_BYTES)
+        message = self._read(key, payload, now_s)
         if key.station == self._own:
             if message.run != self._run:
                 self._namesake_s = now_s
@@ -83,11 +90,26 @@ class Roster:
             if back is not None and mine and back.sent_us not in self._sent_us:
                 raise StationsError(f"{key.station} answers what this station has not said lately.")
             other.on_beacon(message, back if mine else None, now_s, now_utc_s)
+            self._not_understood.discard(key.station)
+
+    def _read(self, key: Key, payload: bytes, now_s: float) -> VehicleWire | BeaconWire:
+        """Of a station that is not understood it is not known whether it flies. Raises StationsError."""
+        try:
+            if key.vehicle is None:
+                return decode(payload, BeaconWire, BEACON_BYTES)
+            return decode(payload, VehicleWire, VEHICLE_BYTES)
+        except StationsError:
+            if key.station == self._own:
+                self._namesake_s = now_s
+            elif len(self._not_understood) < MOST_STATIONS:
+                self._not_understood.add(key.station)
+            raise
 
     def _admitted(self, key: Key, now_s: float) -> Other:
         if len(self._others) >= MOST_STATIONS:
             longest = max(self._others, key=lambda name: now_s - self._others[name].heard_s)
-            if now_s - self._others[longest].heard_s < LOST_S:
+            if now_s - self._others[longest].heard_s < LOST_S or self._others[longest].was_flying:
+                self._too_many_s = now_s
                 raise StationsError(f"{key.station} is one station more than the {MOST_STATIONS} that are kept.")
             del self._others[longest]
         other = self._others[key.station] = Other(key.station, now_s)

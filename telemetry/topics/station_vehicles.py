@@ -86,6 +86,8 @@ class OtherStation:
     clock_within_s: float | None = None
     """How wrong that may be."""
     hears_us: bool = False
+    is_double: bool = False
+    """Another process speaks under its name, too, and is not shown."""
     text: str = ""
     """What is wrong and what to do; empty: nothing."""
 
@@ -100,6 +102,10 @@ class StationsStatus:
     router: Literal["connected", "lost"]
     text: str = ""
     """What is wrong with the way to the router, and what to do."""
+    listens_since_t_mono_s: float | None = None
+    """Since when the router answers; None: it does not."""
+    leaves_out: str = ""
+    """Why stations that speak are not among these; empty: none that is known of."""
     stations: tuple[OtherStation, ...] = ()
     vehicles: tuple[OtherVehicle, ...] = ()
     refused: int = 0

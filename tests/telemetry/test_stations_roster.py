@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from telemetry.stations.compared_clocks import Clocks
 from telemetry.stations.other import GONE_S, LOST_S
 from telemetry.stations.roster import Roster
-from telemetry.stations.station_messages import BeaconWire, HeardWire, encode
+from telemetry.stations.station_messages import BeaconWire, HeardWire, encode, vehicle_wire
 from telemetry.stations.station_names import MOST_STATIONS, beacon_key, vehicle_key
 from telemetry.stations.when_told import CHANGING_S, STILL_S, Telling
 from telemetry.topics.station_vehicles import FleetVehicle, OtherVehicle
@@ -119,7 +119,7 @@ def test_the_true_age_lies_within_what_is_told(seed: int, off_s: float, utc_off_
     assert here.roster.refused == there.roster.refused == 0
 
 
-def test_a_station_is_lost_at_once_and_its_vehicles_go_after_a_time() -> None:
+def test_a_station_is_lost_at_once_and_its_vehicles_that_stood_go_after_a_time() -> None:
     here, there = Station("Alpha", 0.0), Station("Bravo", 5.0)
     net = Net([here, there], 1)
     net.run(5.0)
@@ -131,8 +131,62 @@ def test_a_station_is_lost_at_once_and_its_vehicles_go_after_a_time() -> None:
     assert "keep clear" in bravo.text
     assert len(here.sees(net.true_s)) == 2
     assert here.sees(net.true_s + GONE_S) == ()
-    assert len(here.roster.stations(net.true_s, net.true_s)) == 1
-    assert here.roster.stations(net.true_s + 4000.0, 0.0) == ()
+    # It may have started since, however long ago that was.
+    assert [station.state for station in here.roster.stations(net.true_s + 40_000.0, 0.0)] == ["lost"]
+
+
+def test_a_vehicle_that_was_in_the_air_does_not_go() -> None:
+    here = Roster("Alpha", 9)
+    for number, in_air in ((1, True), (2, False)):
+        wire = vehicle_wire(at(100.0, number, armed=in_air, in_air=in_air), run=1, count=1, now_mono_s=100.0)
+        here.on_message(vehicle_key("Bravo", number), encode(wire), now_s=100.0, now_utc_s=0.0)
+    assert [other.it.number for other in here.vehicles(100.0)] == [1, 2]
+    assert [other.it.number for other in here.vehicles(40_000.0)] == [1]
+    # Nor for others who come: there is no room for them, and that is said.
+    for index in range(MOST_STATIONS):
+        here.on_message(beacon_key(f"S{index}"), encode(BeaconWire(1, 1, 0, 0, 0, ())), now_s=4e4, now_utc_s=0.0)
+    assert "Bravo" in [station.name for station in here.stations(4e4, 0.0)]
+    assert "more than 32 stations" in here.leaves_out(4e4)
+
+
+def test_a_station_that_is_not_understood_is_left_out_until_it_is() -> None:
+    here, there = Roster("Alpha", 9), Station("Bravo", 0.0)
+    here.on_message(vehicle_key("Bravo", 1), b"\x93 of another version", now_s=1.0, now_utc_s=0.0)
+    assert here.stations(1.0, 0.0) == ()
+    assert "Messages of Bravo cannot be understood" in here.leaves_out(5000.0)
+    for key, payload in there.said(5000.0, beacon=True):
+        here.on_message(key, payload, now_s=5000.0, now_utc_s=0.0)
+    assert here.leaves_out(5000.0) == ""
+    here.refuse_unread(3, 5000.0)
+    assert "too long or too many" in here.leaves_out(5000.1)
+    assert here.leaves_out(5060.0) == ""
+
+
+def test_of_a_thousand_mutated_messages_none_is_taken_for_more_than_its_own_stations_word() -> None:
+    """Bytes of true messages turned, cut, doubled and sent under their own name: no fault, nothing without bounds."""
+    here, there, drawn = Roster("Alpha", 9), Station("Bravo", 0.0), random.Random(5)
+    true = [message for second in range(4) for message in there.said(100.0 + second, beacon=True)]
+    for _ in range(1000):
+        key, payload = drawn.choice(true)
+        mutated = bytearray(payload)
+        for _ in range(drawn.randint(1, 4)):
+            place = drawn.randrange(len(mutated))
+            match drawn.randrange(3):
+                case 0:
+                    mutated[place] = drawn.randrange(256)
+                case 1:
+                    del mutated[place:]
+                    mutated += payload[:1]
+                case _:
+                    mutated[place:place] = mutated[: drawn.randrange(40)]
+        here.on_message(key, bytes(mutated), now_s=104.0, now_utc_s=0.0)
+        told = here.stations(104.0, 1e9), here.vehicles(104.0)
+        assert len(told[0]) <= 1
+        for other in told[1]:
+            assert other.it.lat_deg is None or -90.0 <= other.it.lat_deg <= 90.0
+            assert other.oldest_t_mono_s is None or other.oldest_t_mono_s <= 104.0
+            assert (other.it.name + other.it.mode + other.it.alarm).isprintable()
+    assert here.refused > 500
 
 
 def test_a_station_that_starts_again_is_heard_at_once_with_a_new_clock() -> None:
@@ -159,8 +213,8 @@ def test_two_under_one_name_are_told_and_not_mixed() -> None:
     assert "Two stations call themselves Bravo" in bravo.text
     assert [other.it.number for other in here.sees(net.true_s)] == [1]
     assert here.roster.refused > 10
-    assert one.roster.has_namesake(net.true_s + one.off_s)
-    assert not here.roster.has_namesake(net.true_s)
+    assert "calls itself Bravo, too" in one.roster.leaves_out(net.true_s + one.off_s)
+    assert here.roster.leaves_out(net.true_s) == ""
 
 
 def test_what_came_before_is_refused() -> None:
