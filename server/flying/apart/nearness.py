@@ -35,6 +35,8 @@ EARLY_LATE_S, EARLY_LATE_SHARE = 2.0, 0.1
 """Of a plan's predicted times."""
 VEER_SHARE = 0.2
 """Of its speed: so much a vehicle's ball grows in a second while nothing is heard, or where no plan is flown."""
+_FLAT = 1.02
+"""What ``offset_m`` may be wrong by, over the ways that are flown."""
 _ADVICE = "Hold one of them, or lead it away."
 _ALONE = "Hold yours or lead it away, and call the other station."
 
@@ -48,6 +50,8 @@ class Flown:
     ahead: Ahead | None
     unsure_m: float = 0.0
     """Added to its ball: what it may have moved because the age of its position is not known well."""
+    is_silent: bool = False
+    """Of another station, and not heard for so long that nothing tells where it is by now."""
 
 
 Pair = tuple[int, int | str]
@@ -91,27 +95,75 @@ class Nearness:
         limits_m = {pair: OVER_M if pair in self._near else NEAR_M for pair in found}
         self._near = {pair: at for pair, at in found.items() if at.distance_m < limits_m[pair]}
         self.alarms = {}
-        for (one, other), at in sorted(self._near.items(), key=lambda item: -item[1].distance_m):
+        silent = {name for name, each in elsewhere.items() if each.is_silent}
+        # Of several the nearest is told, and before one that may be anywhere one that is there.
+        for (one, other), at in sorted(self._near.items(), key=lambda it: (it[0][1] not in silent, -it[1].distance_m)):
+            if isinstance(other, str):
+                self.alarms[one] = _of_other_station(one, flown[one].name, elsewhere[other], at, now_s)
+                continue
             key = f"near {one} {other}"
-            its_name = elsewhere[other].name if isinstance(other, str) else flown[other].name
-            text = said(flown[one].name, its_name, at, now_s, elsewhere=isinstance(other, str))
-            self.alarms[one] = VehicleAlarm(kind="near", key=key, text=text)
-            if isinstance(other, int):
-                text = said(its_name, flown[one].name, at, now_s)
-                self.alarms[other] = VehicleAlarm(kind="near", key=key, text=text)
+            for its, name, others_name in (
+                (one, flown[one].name, flown[other].name),
+                (other, flown[other].name, flown[one].name),
+            ):
+                text = f"{said(name, others_name, at, now_s)} {_ADVICE}"
+                self.alarms[its] = VehicleAlarm(kind="near", key=key, text=text)
+
+
+def _of_other_station(number: int, name: str, other: Flown, at: Nearest, now_s: float) -> VehicleAlarm:
+    """That it is heard no more is another alarm than the one before: whoever has seen that has not seen this."""
+    if other.is_silent:
+        text = f"{other.name} is not heard any more, and may be where {name} flies. {_ALONE}"
+        return VehicleAlarm(kind="near", key=f"near {number} {other.name} silent", text=text)
+    return VehicleAlarm(
+        kind="near", key=f"near {number} {other.name}", text=f"{said(name, other.name, at, now_s)} {_ALONE}"
+    )
 
 
 def found_among(
     flown: Mapping[int, Flown], now_s: float, elsewhere: Mapping[str, Flown] | None = None
 ) -> dict[Pair, Nearest]:
-    """How near each pair comes to each other, by their numbers."""
-    pairs: list[Pair] = [*combinations(sorted(flown), 2), *((one, other) for one in flown for other in elsewhere or {})]
+    """How near each pair comes to each other; without those of other stations that are too far away for any alarm."""
+    others = elsewhere or {}
+    reach_m = {name: _reach_m(of, now_s) for name, of in (*flown.items(), *others.items())}
+    pairs: list[Pair] = [*combinations(sorted(flown), 2)]
+    for one in flown:
+        apart_m = _apart_m(flown[one], list(others.values()))
+        pairs += [
+            (one, other)
+            for other, far_m in zip(others, apart_m, strict=True)
+            if far_m <= _FLAT * (reach_m[one] + reach_m[other]) + OVER_M
+        ]
     found: dict[Pair, Nearest] = {}
     for one, other in pairs:
-        its = (elsewhere or {})[other] if isinstance(other, str) else flown[other]
+        its = others[other] if isinstance(other, str) else flown[other]
         if (at := near_each_other(flown[one], its, now_s)) is not None:
             found[one, other] = at
     return found
+
+
+def _apart_m(one: Flown, others: Sequence[Flown]) -> list[float]:
+    """Between the last places, along the ground: at a glance, of many."""
+    places_deg = np.array([(of.state.lat_deg or 0.0, of.state.lon_deg or 0.0) for of in others]).reshape(-1, 2)
+    east_m, north_m = offset_m((one.state.lat_deg or 0.0, one.state.lon_deg or 0.0), places_deg[:, 0], places_deg[:, 1])
+    return np.hypot(east_m, north_m).tolist()
+
+
+def _reach_m(of: Flown, now_s: float) -> float:
+    """No part of its line, nor of the ball around it, is farther from its last place."""
+    state, way_m = of.state, 0.0
+    if of.ahead is not None:
+        place_deg = state.lat_deg or 0.0, state.lon_deg or 0.0
+        east_m, north_m = offset_m(place_deg, of.ahead.lat_lon_deg[:, 0], of.ahead.lat_lon_deg[:, 1])
+        way_m = float(np.max(np.hypot(east_m, north_m), initial=0.0))
+    age_s = 0.0 if state.position_t_mono_s is None else max(0.0, now_s - state.position_t_mono_s)
+    speed_m_s = math.hypot(state.v_east_m_s or 0.0, state.v_north_m_s or 0.0, state.v_down_m_s or 0.0)
+    straight_m = (1.0 + VEER_SHARE) * speed_m_s * (age_s + AHEAD_S)
+    return _radius_m(of) + max(way_m, straight_m)
+
+
+def _radius_m(of: Flown) -> float:
+    return max(RADIUS_M, 2.0 * (of.state.horizontal_accuracy_m or 0.0)) + of.unsure_m
 
 
 def near_each_other(one: Flown, other: Flown, now_s: float) -> Nearest | None:
@@ -122,11 +174,10 @@ def near_each_other(one: Flown, other: Flown, now_s: float) -> Nearest | None:
     return nearest(one_line, other_line, since_s=now_s)
 
 
-def said(name: str, other: str, at: Nearest, now_s: float, *, elsewhere: bool = False) -> str:
+def said(name: str, other: str, at: Nearest, now_s: float) -> str:
     within_s = at.t_s - now_s
     when = "now" if within_s < 1.5 else f"in {within_s:.0f} s"
-    advice = _ALONE if elsewhere else _ADVICE
-    return f"{name} and {other} may come within {at.distance_m:.0f} m of each other {when}. {advice}"
+    return f"{name} and {other} may come within {at.distance_m:.0f} m of each other {when}."
 
 
 def line_of(
@@ -139,7 +190,7 @@ def line_of(
     heard_s = now_s if state.position_t_mono_s is None else min(now_s, state.position_t_mono_s)
     v_enu_m_s = np.array([state.v_east_m_s or 0.0, state.v_north_m_s or 0.0, -(state.v_down_m_s or 0.0)])
     v_enu_m_s[2] *= not flat
-    radius_m = max(RADIUS_M, 2.0 * (state.horizontal_accuracy_m or 0.0)) + of.unsure_m
+    radius_m = _radius_m(of)
     home_m = None if flat else state.home_alt_amsl_m
     if ahead is not None and (flat or home_m is not None):
         east_m, north_m = offset_m(origin_deg, ahead.lat_lon_deg[:, 0], ahead.lat_lon_deg[:, 1])

@@ -1,7 +1,7 @@
 """Other stations and their vehicles: shown on every page, and held apart from this station's own. No command crosses.
 
-A position counts at the worse end of its age, for as long as that still says where its vehicle may be; what counts no
-longer is said to count no longer.
+A position counts at the worse end of its age. What is not heard any more is taken to stand anywhere around where it was
+seen last, and that is said.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ import time
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from server.door.hub import Hub
-from server.flying.apart.nearness import STRAIGHT_S, Flown
+from server.flying.apart.nearness import AHEAD_S, STANDS_M_S, STRAIGHT_S, VEER_SHARE, Flown
+from server.flying.apart.others_heard import NODE_SILENT_S, name_of, row_of_others, with_missing
 from server.heard.node_states import Nodes
 from server.heard.relay import Relay
 from server.schemas import CheckRow, OtherStationDoc, OtherVehicleDoc, StationsMessage
@@ -33,7 +34,7 @@ UNCOMPARED_S = 10.0
 """Added to the age of what came from a station whose clock was not compared yet."""
 FASTEST_M_S = 15.0
 """Of a vehicle that tells no velocity: so fast it may fly, anywhere."""
-TELL_EVERY_S, SHOW_EVERY_S, SILENT_S = 0.2, 0.5, 3.0
+TELL_EVERY_S, SHOW_EVERY_S = 0.2, 0.5
 _NODE_SILENT = (
     "The stations node does not answer: other stations are neither seen nor told anything. Own vehicles are not "
     "affected. It is started again by itself."
@@ -72,7 +73,8 @@ class OtherStations:
         return [*relay.loops(), self._start(), self._tell(), self._show()]
 
     def on_status(self, status: StationsStatus) -> None:
-        before, self.status = self.status, status
+        before = self.status
+        self.status = status = with_missing(before, status)
         was = {station.name: station.state for station in before.stations} if before else {}
         for station in status.stations:
             if station.state != was.get(station.name, station.state):
@@ -81,19 +83,12 @@ class OtherStations:
             self._hub.publish(self.message())
 
     def flown(self, now_s: float) -> list[Flown]:
-        """In the air, each from where it was at the earliest."""
-        return [_flown(other) for other in self._vehicles if other.it.in_air and counts(other, now_s)]
+        """In the air and seen somewhere: each from where it was at the earliest."""
+        return [_flown(other, now_s) for other in self._vehicles if other.it.in_air and other.it.lat_deg is not None]
 
     def row(self) -> CheckRow:
-        """Of the check before a start: where another station's vehicle will be, nothing tells here."""
-        now_s, status = self._now_mono_s(), self.status
-        if status is None or status.router == "lost" or now_s - status.t_mono_s > SILENT_S:
-            return _row("accept", "Other stations are not heard: whether their vehicles fly is not known.")
-        if lost := [station.name for station in status.stations if station.state == "lost"]:
-            return _row("accept", f"{', '.join(lost)}: not heard, and whether its vehicles fly is not known.")
-        if flies := [_name(other) for other in status.vehicles if other.it.in_air]:
-            return _row("accept", f"In the air, and no plan tells where it will be: {', '.join(flies)}.")
-        return _row("good", "No vehicle of another station that is heard is in the air.")
+        """Of the check before a start."""
+        return row_of_others(self.status, self._now_mono_s())
 
     def message(self) -> StationsMessage:
         now_s, status = self._now_mono_s(), self.status
@@ -105,7 +100,7 @@ class OtherStations:
                 stations=[],
                 refused=0,
             )
-        silent = now_s - status.t_mono_s > SILENT_S
+        silent = now_s - status.t_mono_s > NODE_SILENT_S
         return StationsMessage(
             station=self._meeting.name,
             router="lost" if silent else status.router,
@@ -153,31 +148,30 @@ def age_s(other: OtherVehicle, now_s: float) -> float | None:
 
 
 def counts(other: OtherVehicle, now_s: float) -> bool:
-    """Whether it is held apart from others."""
+    """Whether its position still says where it may be."""
     age = age_s(other, now_s)
     return age is not None and age <= COUNTS_S
 
 
-def _row(state: Literal["accept", "good"], text: str) -> CheckRow:
-    mend = "" if state == "good" else "Agree with whoever flies there."
-    return CheckRow(code="others", state=state, text=text, mend=mend)
+def _flown(other: OtherVehicle, now_s: float) -> Flown:
+    """It may be where it was told at the earliest of the times that are possible, or at the latest.
 
-
-def _name(other: OtherVehicle) -> str:
-    return f"{other.it.name} ({other.station} {other.it.number})"
-
-
-def _flown(other: OtherVehicle) -> Flown:
-    """It may be where it was told at the earliest of the times that are possible, or at the latest."""
+    From ``OLD_S`` on it may have flown elsewhere; after ``COUNTS_S`` it stands anywhere that it could reach until then.
+    """
     it = other.it
-    compared = other.oldest_t_mono_s is not None
     likely_s = it.position_t_mono_s or 0.0
-    oldest_s = other.oldest_t_mono_s if other.oldest_t_mono_s is not None else likely_s - UNCOMPARED_S
-    unsure_s = other.unsure_s if compared else UNCOMPARED_S
+    oldest_s = likely_s - UNCOMPARED_S if other.oldest_t_mono_s is None else other.oldest_t_mono_s
+    unsure_s = UNCOMPARED_S if other.oldest_t_mono_s is None else other.unsure_s
     east_m_s, north_m_s, up_m_s = it.v_enu_m_s or (0.0, 0.0, 0.0)
-    unsure_m = math.hypot(east_m_s, north_m_s, up_m_s) * unsure_s
+    speed_m_s, age = math.hypot(east_m_s, north_m_s, up_m_s), age_s(other, now_s) or 0.0
+    unsure_m = speed_m_s * unsure_s + FASTEST_M_S * (min(max(age, OLD_S), COUNTS_S) - OLD_S)
     if it.v_enu_m_s is None:
         unsure_m = FASTEST_M_S * (COUNTS_S + STRAIGHT_S)
+    is_silent = not counts(other, now_s)
+    if is_silent:
+        ahead_s = AHEAD_S if speed_m_s < STANDS_M_S else STRAIGHT_S
+        unsure_m += (1.0 + VEER_SHARE) * speed_m_s * (COUNTS_S + ahead_s)
+        oldest_s, east_m_s, north_m_s, up_m_s = now_s, 0.0, 0.0, 0.0
     state = VehicleState(
         0,
         0,
@@ -191,7 +185,7 @@ def _flown(other: OtherVehicle) -> Flown:
         v_down_m_s=-up_m_s,
         horizontal_accuracy_m=it.within_m,
     )
-    return Flown(_name(other), state, None, unsure_m)
+    return Flown(name_of(other), state, None, unsure_m, is_silent)
 
 
 def _doc(other: OtherVehicle, now_s: float) -> OtherVehicleDoc:
@@ -223,7 +217,10 @@ def _words(other: OtherVehicle, age: float | None) -> Iterator[str]:
     if it.in_air and age is None:
         yield "It is in the air, and where is not known: it is not held apart from yours."
     elif it.in_air and age is not None and age > COUNTS_S:
-        yield f"Not seen for {age:.0f} s: it is no longer held apart from yours. Call its pilot."
+        yield (
+            "It is not seen any more, and may be anywhere: yours are held apart from where it could fly in "
+            f"{COUNTS_S:.0f} s. Call its pilot."
+        )
     if it.link == "lost":
         yield f"{other.station} hears nothing of it any more."
     if it.alarm:
