@@ -9,18 +9,21 @@ from __future__ import annotations
 import argparse
 import asyncio
 import logging
+import math
 import secrets
 import sys
 import time
+from datetime import UTC, datetime
 from pathlib import Path
 
 from telemetry.bus.bus import Bus
 from telemetry.bus.node import LOOK_EVERY_S, NodeContext, run_node
 from telemetry.errors import StationsError
 from telemetry.stations.roster import Roster
-from telemetry.stations.router_wire import Route, Wire
+from telemetry.stations.router_wire import Wire
 from telemetry.stations.station_messages import encode
 from telemetry.stations.station_names import beacon_key, checked_name, vehicle_key
+from telemetry.stations.station_proof import Route, ends_soon, why_refused
 from telemetry.stations.when_told import Telling
 from telemetry.topics.messages import Topic
 from telemetry.topics.station_vehicles import OwnVehicles, StationsStatus
@@ -28,6 +31,8 @@ from telemetry.topics.station_vehicles import OwnVehicles, StationsStatus
 _log = logging.getLogger(__name__)
 
 TURN_S, BEACON_S, STATUS_S, AGAIN_S = 0.1, 1.0, 0.5, 1.0
+REOPEN_S, ENDS_EVERY_S = 5.0, 600.0
+_MEANS = "Other stations are neither seen nor told anything. Own vehicles are not affected."
 KNOWS_S = 10.0
 """Without the server's word for so long this node says nothing: what it said before may be true no more. A server that
 starts again is back sooner."""
@@ -42,7 +47,7 @@ class StationsNode:
         self._roster, self._telling = Roster(station, run), Telling(run)
         self._own = OwnVehicles(0.0)
         self._wire: Wire | None = None
-        self._fault = ""
+        self._fault = self._ends = ""
         self._since_s: float | None = None
         self._told: StationsStatus | None = None
 
@@ -61,20 +66,29 @@ class StationsNode:
                 self._own = message
 
     async def _keep_wire(self) -> None:
-        """Until cancelled. Before the first connection it is tried again here, later by Zenoh itself."""
+        """Until cancelled. A router that is away for a moment Zenoh finds again itself; after that it is asked why."""
         while True:
             try:
+                stamp = await asyncio.to_thread(_stamp, self._route.file)
                 self._wire = await Wire.open(self._route, time.monotonic)
-            except StationsError as error:
-                self._note(error.what + " " + error.advice)
+            except StationsError:
+                why = await asyncio.to_thread(why_refused, self._route, datetime.now(UTC))
+                self._note(f"{why} {_MEANS}")
                 await asyncio.sleep(AGAIN_S)
                 continue
             try:
                 async with asyncio.TaskGroup() as group:
-                    for part in (self._tell_others, self._hear_others, self._watch_router):
-                        group.create_task(part(self._wire))
+                    wire = self._wire
+                    parts = [
+                        group.create_task(part)
+                        for part in (self._tell_others(wire), self._hear_others(wire), self._watch_ends())
+                    ]
+                    await self._watch_router(wire, stamp)
+                    for part in parts:
+                        part.cancel()
             finally:
-                wire, self._wire = self._wire, None
+                # Also where it is open again before anybody looks: what was said meanwhile was not heard.
+                wire, self._wire, self._since_s = self._wire, None, None
                 await wire.close()
 
     async def _tell_others(self, wire: Wire) -> None:
@@ -103,17 +117,25 @@ class StationsNode:
             if refused:
                 self._roster.refuse_unread(refused, time.monotonic())
 
-    async def _watch_router(self, wire: Wire) -> None:
-        where = ", ".join(self._route.routers)
+    async def _watch_router(self, wire: Wire, stamp: int) -> None:
+        """Until it is to be opened anew: it was lost for ``REOPEN_S``, or the station's file is another one."""
+        where, lost_s = ", ".join(self._route.routers), math.inf
         while True:
+            now_s = time.monotonic()
             if await wire.is_connected():
+                lost_s = math.inf
                 self._note("")
             else:
-                self._note(
-                    f"The router at {where} does not answer: other stations are neither seen nor told anything. "
-                    "Own vehicles are not affected. Start it again, or mend the network."
-                )
+                lost_s = min(lost_s, now_s)
+                self._note(f"The router at {where} does not answer: start it again, or mend the network. {_MEANS}")
+            if now_s - lost_s > REOPEN_S or await asyncio.to_thread(_stamp, self._route.file) not in (0, stamp):
+                return
             await asyncio.sleep(STATUS_S)
+
+    async def _watch_ends(self) -> None:
+        while True:
+            self._ends = await asyncio.to_thread(ends_soon, self._route, datetime.now(UTC))
+            await asyncio.sleep(ENDS_EVERY_S)
 
     def _note(self, fault: str) -> None:
         if fault != self._fault:
@@ -134,7 +156,7 @@ class StationsNode:
         self._since_s = (self._since_s or now_s) if connected else None
         text = self._fault or ("" if connected else "The router is being looked for.")
         leaves_out = roster.leaves_out(now_s)
-        text = f"{leaves_out} {text}".strip()
+        text = " ".join(filter(None, (leaves_out, text, self._ends if connected else "")))
         return StationsStatus(
             t_mono_s=now_s,
             station=self._station,
@@ -147,6 +169,14 @@ class StationsNode:
             refused=roster.refused,
             refused_last=roster.refused_last,
         )
+
+
+def _stamp(file: Path) -> int:
+    """Another one: another file. 0: it is not there, which ends nothing that runs."""
+    try:
+        return file.stat().st_mtime_ns
+    except OSError:
+        return 0
 
 
 def _differ(status: StationsStatus, told: StationsStatus) -> bool:

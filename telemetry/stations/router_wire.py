@@ -11,8 +11,6 @@ import contextlib
 import json
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import zenoh
@@ -21,6 +19,7 @@ from telemetry.errors import StationsError
 from telemetry.stations.router_file import LEASE_MS
 from telemetry.stations.station_messages import BEACON_BYTES
 from telemetry.stations.station_names import EVERYTHING, MOST_STATIONS, MOST_VEHICLES
+from telemetry.stations.station_proof import Route, read_proof
 
 CONNECT_S = 3.0
 _MOST_WAITING = MOST_STATIONS * (MOST_VEHICLES + 1)
@@ -44,16 +43,6 @@ _SETTINGS: dict[str, Any] = {
     # After it was once connected, Zenoh itself connects again.
     "connect/retry": {"period_init_ms": 500, "period_max_ms": 2000, "period_increase_factor": 1.5},
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Route:
-    """Where the router is, and what proves who this station is."""
-
-    routers: tuple[str, ...]
-    """``tls/HOST:PORT``; the first that answers is used"""
-    file: Path
-    """The station's key, its certificate and the authority's, as PEM (``hedgehop stations``)."""
 
 
 class Inbox:
@@ -135,8 +124,16 @@ class Wire:
 
 
 def _opened(route: Route) -> zenoh.Session:
+    proof = read_proof(route.file)
+    tls = "transport/link/tls"
+    settings: dict[str, Any] = {
+        **_SETTINGS,
+        "connect/endpoints": list(route.routers),
+        f"{tls}/connect_private_key_base64": base64.b64encode(proof.key_pem).decode(),
+        f"{tls}/connect_certificate_base64": base64.b64encode(proof.certificate_pem).decode(),
+        f"{tls}/root_ca_certificate_base64": base64.b64encode(proof.authority_pem).decode(),
+    }
     config = zenoh.Config()
-    settings: dict[str, Any] = {**_SETTINGS, **_shown(route.file), "connect/endpoints": list(route.routers)}
     try:
         for name, value in settings.items():
             config.insert_json5(name, json.dumps(value))
@@ -147,21 +144,3 @@ def _opened(route: Route) -> zenoh.Session:
             where=str(route.file),
             advice="Start the router, see that the network leads to it, and that its certificate is for that name.",
         ) from error
-
-
-def _shown(file: Path) -> dict[str, str]:
-    """What proves who this station is, and whom it trusts. Raises StationsError."""
-    begin = "-----BEGIN "
-    try:
-        parts = [begin + part for part in file.read_text(encoding="ascii").split(begin)[1:]]
-        key, certificate, authority = (base64.b64encode(part.encode()).decode() for part in parts)
-    except (OSError, ValueError) as error:
-        raise StationsError(
-            f"The station's file cannot be read: {error}.", where=str(file), advice="Make it with hedgehop stations."
-        ) from error
-    tls = "transport/link/tls"
-    return {
-        f"{tls}/connect_private_key_base64": key,
-        f"{tls}/connect_certificate_base64": certificate,
-        f"{tls}/root_ca_certificate_base64": authority,
-    }

@@ -18,6 +18,7 @@ from server.errors import StartError
 from server.settings import load_settings
 from telemetry.errors import StationsError
 from telemetry.stations.station_names import router_endpoint
+from telemetry.stations.station_proof import Route, ends_soon, read_proof, why_refused
 from tests.server.cli_runs import hedgehop
 
 
@@ -76,7 +77,28 @@ def test_files_of_another_authority_are_made_anew(tmp_path: Path) -> None:
     assert ([path.name for path in written.made], written.kept) == (["Alpha.pem", "Bravo.pem", ROUTER_FILE], [])
     assert (out / "Alpha.pem").read_bytes() != before
     for name in ("Alpha", "Bravo"):
-        assert (out / f"{name}.pem").read_text().endswith((tmp_path / "now" / "tls" / "authority.pem").read_text())
+        proof = read_proof(out / f"{name}.pem")
+        assert proof.authority_pem.strip() == (tmp_path / "now" / "tls" / "authority.pem").read_bytes().strip()
+
+
+@pytest.mark.parametrize(("days", "words"), [(0, "has ended"), (-400, "valid from")])
+def test_a_certificate_that_is_not_valid_is_told_before_anybody_is_asked(tmp_path: Path, days: int, words: str) -> None:
+    write_station_files(tmp_path, CertificateFiles(tmp_path / "data"), ["Alpha"], ["router.example"], now_utc())
+    now = now_utc() + CERTIFICATE_LASTS + timedelta(days=days)
+    route = Route(("tls/127.0.0.1:1",), tmp_path / "Alpha.pem")
+    assert words in why_refused(route, now)
+    assert why_refused(route, now_utc()).startswith("No router answers at 127.0.0.1:1 (")
+
+
+def test_that_a_certificate_ends_is_told_thirty_days_ahead(tmp_path: Path) -> None:
+    write_station_files(tmp_path, CertificateFiles(tmp_path / "data"), ["Alpha"], ["router.example"], now_utc())
+    route = Route(("tls/127.0.0.1:1",), tmp_path / "Alpha.pem")
+    until_utc = read_proof(route.file).until_utc
+    assert ends_soon(route, until_utc - timedelta(days=31)) == ""
+    assert f"ends on {until_utc:%Y-%m-%d}" in ends_soon(route, until_utc - timedelta(days=29))
+    route.file.write_text("nothing")
+    assert "cannot be read" in ends_soon(route, until_utc)
+    assert "cannot be read" in why_refused(route, until_utc)
 
 
 @pytest.mark.parametrize("name", ["", "*", "../up", "a b", "Älpha", "x" * 25])
