@@ -53,9 +53,9 @@ def _look(folder: Path, field: Field, bravo: FieldStation, loop: asyncio.Abstrac
             assert _stations(Station(alpha.server, socket), lambda told: bool(told.stations)).station == "Alpha"
         # The router dies: said, and this station goes on.
         field.router.kill()
-        lost = _stations(alpha, lambda told: bool(told.stations) and told.stations[0].state == "lost")
-        assert "is not heard since" in lost.stations[0].text
-        assert _stations(alpha, lambda told: told.router == "lost").text.startswith("The router at")
+        # On a busy machine the node may be silent for a moment: that is told, too, in other words.
+        _stations(alpha, lambda told: bool(told.stations) and "is not heard since" in told.stations[0].text)
+        _stations(alpha, lambda told: told.router == "lost" and f"127.0.0.1:{field.port}" in told.text)
         assert alpha.http.get("/api/state").is_success
         assert alpha.until(lambda message: message.type == "fleet").vehicles[0].number == 1
 

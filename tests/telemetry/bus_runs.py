@@ -23,12 +23,12 @@ def short_folder() -> Iterator[Path]:
         yield Path(folder)
 
 
-def run(whole: Callable[[], Awaitable[T]]) -> T:
-    return asyncio.run(bounded(whole))
+def run(whole: Callable[[], Awaitable[T]], within_s: float = PATIENCE_S) -> T:
+    return asyncio.run(bounded(whole, within_s))
 
 
-async def bounded(whole: Callable[[], Awaitable[T]]) -> T:
-    async with asyncio.timeout(PATIENCE_S):
+async def bounded(whole: Callable[[], Awaitable[T]], within_s: float = PATIENCE_S) -> T:
+    async with asyncio.timeout(within_s):
         return await whole()
 
 

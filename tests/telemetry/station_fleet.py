@@ -63,7 +63,7 @@ def true_age_s(other: OtherVehicle, at_mono_s: float) -> float:
     """Of its position: all processes here have one clock."""
     assert other.it.lat_deg is not None
     was_s = (other.it.lat_deg - 40.0) / DEG_PER_S
-    return (at_mono_s % 10_000) - was_s
+    return (at_mono_s - was_s + 5_000.0) % 10_000.0 - 5_000.0
 
 
 class Router:
@@ -77,7 +77,8 @@ class Router:
         command = [sys.executable, "-c", _ROUTER, str(self._file)]
         self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         assert self._process.stdout is not None
-        assert await asyncio.to_thread(self._process.stdout.readline) == "open\n"
+        said = asyncio.to_thread(self._process.stdout.readline)
+        assert await asyncio.wait_for(said, PATIENCE_S) == "open\n"
 
     def kill(self) -> None:
         if self._process is None:
@@ -115,13 +116,13 @@ class FieldStation:
                 begun = len(self.statuses)
                 await asyncio.sleep(0.02)
 
-    async def sees(self, *others: str) -> StationsStatus:
-        """All of these live, with vehicles whose age is known, and no others."""
+    async def sees(self, *others: str, vehicles: int = 0) -> StationsStatus:
+        """All of these live, with vehicles whose age is known, so many at least, and no others."""
 
         def holds(status: StationsStatus) -> bool:
             live = {station.name for station in status.stations if station.state == "live" and station.hears_us}
             aged = {other.station for other in status.vehicles if other.oldest_t_mono_s is not None}
-            return status.router == "connected" and live == aged == set(others)
+            return status.router == "connected" and live == aged == set(others) and len(status.vehicles) >= vehicles
 
         return await self.until(holds)
 

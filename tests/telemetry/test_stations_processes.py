@@ -15,16 +15,18 @@ import zenoh
 from server.door.certificates import CertificateFiles, Names, now_utc
 from telemetry.stations.other import LOST_S
 from telemetry.stations.station_messages import encode, vehicle_wire
-from telemetry.stations.station_names import beacon_key, vehicle_key
+from telemetry.stations.station_names import vehicle_key
 from telemetry.topics.station_vehicles import FleetVehicle, StationsStatus
 from tests.telemetry.bad_line import Bad
-from tests.telemetry.bus_runs import run, short_folder
+from tests.telemetry.bus_runs import PATIENCE_S, run, short_folder
 from tests.telemetry.station_fleet import Field, true_age_s
 from tests.telemetry.stations_bench import ROUND_S, measure
 
 pytestmark = [pytest.mark.xdist_group("real-time"), pytest.mark.slow]
 
 NAMES = ("Alpha", "Bravo", "Charlie")
+WHOLE_S = 4 * PATIENCE_S
+"""Several processes, one after the other, each with its own patience."""
 
 
 def test_three_stations_see_each_other_and_again_after_the_router_died() -> None:
@@ -36,17 +38,16 @@ def test_three_stations_see_each_other_and_again_after_the_router_died() -> None
             # No router yet: said, and nothing else happens.
             await alpha.until(lambda status: "No router answers" in status.text)
             await field.router.start()
-            seen = await alpha.sees("Bravo", "Charlie")
+            seen = await alpha.sees("Bravo", "Charlie", vehicles=4)
             await bravo.sees("Alpha", "Charlie")
             await charlie.sees("Alpha", "Bravo")
             _ages_are_true(seen)
-            assert len(seen.vehicles) == 4
             assert seen.refused == 0
             # The router dies: both others are lost at once, with words; it comes back, and so do they.
             field.router.kill()
             lost = await alpha.until(lambda status: all(station.state == "lost" for station in status.stations))
             assert all("is not heard since" in station.text for station in lost.stations)
-            assert all(lost.t_mono_s - station.heard_t_mono_s < LOST_S + 2.0 for station in lost.stations)
+            assert all(lost.t_mono_s - station.heard_t_mono_s >= LOST_S for station in lost.stations)
             away = await alpha.until(lambda status: status.router == "lost")
             assert "Own vehicles are not affected" in away.text
             assert len(away.vehicles) == 4
@@ -57,7 +58,7 @@ def test_three_stations_see_each_other_and_again_after_the_router_died() -> None
             bravo.node.send_signal(signal.SIGTERM)
             gone = await alpha.until(lambda status: [s.state for s in status.stations] == ["lost", "live"])
             assert gone.stations[0].name == "Bravo"
-            assert await asyncio.to_thread(bravo.node.wait, 30.0) == 0
+            assert await asyncio.to_thread(bravo.node.wait, PATIENCE_S) == 0
 
     _in_folder(whole)
 
@@ -89,10 +90,12 @@ def test_the_router_lets_nobody_speak_under_anothers_name() -> None:
                 # Under its own name it is let through, and there it is refused as what it is.
                 for payload in (b"", b"\xff" * 40, b"x" * 60_000):
                     before = alpha.statuses[-1].refused
-                    session.put(beacon_key("Charlie"), payload)
+                    # Not where Charlie itself speaks: of one name only the newest message counts.
+                    session.put(vehicle_key("Charlie", 31), payload)
                     await alpha.until(lambda status, before=before: status.refused > before)
+                before = alpha.statuses[-1].refused
                 session.put("hedgehop/stations/1/Charlie/order/1", b"land")
-                seen = await alpha.until(lambda status: "no station uses" in status.refused_last)
+                seen = await alpha.until(lambda status: status.refused > before)
             assert {station.name for station in seen.stations} == {"Charlie"}
             assert 7 not in {other.it.number for other in seen.vehicles}
             _ages_are_true(await alpha.sees("Charlie"))
@@ -108,15 +111,24 @@ def test_without_a_certificate_of_the_authority_nobody_comes_in() -> None:
             await field.router.start()
             alpha = await stack.enter_async_context(field.station("Alpha"))
             await alpha.until(lambda status: status.router == "connected")
+            its_own = (field.files / "Bravo.pem").read_bytes()
             (field.files / "Bravo.pem").write_bytes((others.files / "Bravo.pem").read_bytes())
             bravo = await stack.enter_async_context(field.station("Bravo"))
-            await bravo.until(lambda status: "No router answers" in status.text)
+            await bravo.until(lambda status: "is of another authority than this station's file" in status.text)
             # The console's certificate is of the same authority, and shows no station.
             CertificateFiles(folder / "data").renew(now_utc(), Names(frozenset({"localhost"}), frozenset()))
             (field.files / "Charlie.pem").write_bytes((folder / "data" / "tls" / "console.pem").read_bytes())
             charlie = await stack.enter_async_context(field.station("Charlie"))
-            await charlie.until(lambda status: "No router answers" in status.text)
+            await charlie.until(lambda status: "refuses this station's certificate" in status.text)
             assert alpha.statuses[-1].stations == ()
+            # With a file of its own at last it comes in, without being started again.
+            (field.files / "Bravo.pem").write_bytes(its_own)
+            await alpha.sees("Bravo")
+            # And a file that is replaced while it is connected is taken up, for the day on which the old one ends.
+            begun = (await bravo.until(lambda status: status.router == "connected")).listens_since_t_mono_s
+            (field.files / "Bravo.pem").write_bytes(its_own)
+            again = await bravo.until(lambda status: status.listens_since_t_mono_s not in (None, begun))
+            assert again.router == "connected"
 
     _in_folder(whole)
 
@@ -124,7 +136,7 @@ def test_without_a_certificate_of_the_authority_nobody_comes_in() -> None:
 def test_over_bad_lines_no_age_is_told_too_young_and_a_vehicle_stays_within_its_budget() -> None:
     """``stations_bench`` in short."""
     with short_folder() as folder:
-        result = run(lambda: measure(folder, stations=2, vehicles=3, seconds=5.0, bad=Bad()))
+        result = run(lambda: measure(folder, stations=2, vehicles=3, seconds=5.0, bad=Bad()), WHOLE_S)
     assert len(result.ages_s)
     assert (result.told_s >= result.ages_s - ROUND_S).all()
     assert 0.0 < max(result.up_bytes_per_s, result.down_bytes_per_s) < 2000.0
@@ -154,4 +166,4 @@ def _session(field: Field, name: str) -> zenoh.Session:
 
 def _in_folder(whole: object) -> None:
     with short_folder() as folder:
-        run(lambda: whole(folder))  # type: ignore[operator]
+        run(lambda: whole(folder), WHOLE_S)  # type: ignore[operator]
