@@ -60,6 +60,11 @@ describe("other stations' vehicles", () => {
       told([{ ...bee, text: "Not seen for 45 s." }], { text: "The router does not answer.", router: "lost" }),
     );
     expect(wrong.value).toEqual(["The router does not answer.", "Bee (Bravo 1): Not seen for 45 s."]);
+    // Of a lost station its own sentence is enough.
+    const lost = told([{ ...bee, text: "Not seen." }]);
+    lost.stations[0] = { ...lost.stations[0]!, state: "lost", text: "Bravo is not heard." };
+    receive(lost);
+    expect(wrong.value).toEqual(["Bravo is not heard."]);
     receive(told([bee]));
     expect(wrong.value).toEqual([]);
     expect(stations.value?.stations[0]?.vehicles).toEqual([bee]);

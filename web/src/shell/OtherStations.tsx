@@ -39,12 +39,16 @@ export function OtherStations() {
   const isPast = failed.value === "server" || late_s.value !== null;
   return (
     <section class="stations" aria-label="Other stations" data-testid="stations">
-      {wrong.value.map((text) => (
-        <p key={text} class="stations-wrong" role="status">
-          <Icon name="warning" size={16} />
-          <span>{text}</span>
-        </p>
-      ))}
+      {wrong.value.length > 0 && (
+        <div class="stations-wrong" role="status">
+          {wrong.value.map((text) => (
+            <p key={text}>
+              <Icon name="warning" size={16} />
+              <span>{text}</span>
+            </p>
+          ))}
+        </div>
+      )}
       {message.stations.length > 0 && (
         <ul>
           {message.stations.map((station) => (

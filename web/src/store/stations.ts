@@ -31,16 +31,18 @@ export function words(vehicle: OtherVehicleDoc): string {
     .join(" · ");
 }
 
-const wrongWith = ({ name, text, vehicles }: OtherStationDoc) => [
-  ...(text ? [text] : []),
-  ...vehicles
-    .filter((each) => each.text)
-    .map((each) => `${each.name} (${name} ${each.number}): ${each.text}`),
-];
+/** Of a lost station its own sentence stands for all that it flew: what each of them said last is not said again. */
+const wrongVehicles = ({ name, state, vehicles }: OtherStationDoc) =>
+  state === "lost"
+    ? []
+    : vehicles
+        .filter((each) => each.text)
+        .map((each) => `${each.name} (${name} ${each.number}): ${each.text}`);
 
-/** What is wrong, the way to the others first: without it all of them are lost at once. */
+/** What is wrong, the worst first: the way to the others, without which all of them are lost; stations; vehicles. */
 export const wrong = computed(() => {
   const message = stations.value;
   if (!message) return [];
-  return [...(message.text ? [message.text] : []), ...message.stations.flatMap(wrongWith)];
+  const told = message.stations.map(({ text }) => text);
+  return [message.text, ...told, ...message.stations.flatMap(wrongVehicles)].filter(Boolean);
 });
