@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike
 
 from mapping.errors import CapacityError, ParameterError
 from mapping.geometry.arrays import F64, I64
+from mapping.voxels.blocks import find, place_in, state_of, voxel_in
 from mapping.voxels.checks import checked_points
 from mapping.voxels.map import VoxelMap
 from mapping.voxels.marks import LARGEST_KEY
-from mapping.voxels.store import EXPLAINED, IN_BLOCK, OCCUPIED, SIDE_BITS, find, state_of
+from mapping.voxels.store import BRICK, BRICK_BITS, CHUNK_BITS, EXPLAINED, OCCUPIED, SIDE_BITS
 
 MOST_POINTS = 5_000_000
 
@@ -112,6 +113,7 @@ def search_sector(
 def _search(store, points, x0, y0, z0, cos, sin, resolution, mask):
     scale = 1.0 / resolution
     found = np.empty(points.shape[0], np.int64)
+    cells, bricks, chunks, kinds, occupied = store.cells, store.bricks, store.chunks, store.kinds, store.occupied
     n = 0
     last_x, last_y, last_z, block = LARGEST_KEY, 0, 0, -1
     for i in range(points.shape[0]):
@@ -125,12 +127,17 @@ def _search(store, points, x0, y0, z0, cos, sin, resolution, mask):
         bx, by, bz = x >> SIDE_BITS, y >> SIDE_BITS, z >> SIDE_BITS
         if bx != last_x or by != last_y or bz != last_z:
             block = find(store, bx, by, bz)
-            if block >= 0 and store.occupied[block] == 0:
+            if block >= 0 and occupied[block] == 0:
                 block = -1
             last_x, last_y, last_z = bx, by, bz
-        if block >= 0:
-            voxel = (z & IN_BLOCK) << 6 | (y & IN_BLOCK) << 3 | (x & IN_BLOCK)
-            if state_of(store, block, voxel) & mask == OCCUPIED:
-                found[n] = i
-                n += 1
+        if block < 0:
+            continue
+        voxel = voxel_in(x, y, z)
+        slot = np.int64(bricks[block, voxel >> BRICK_BITS])
+        if slot == 0:
+            continue
+        place = place_in(chunks[block, (slot - 1) >> CHUNK_BITS], slot) + (voxel & BRICK - 1)
+        if state_of(kinds, np.int64(cells[place])) & mask == OCCUPIED:
+            found[n] = i
+            n += 1
     return found[:n].copy()

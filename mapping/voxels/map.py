@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mapping.geometry.arrays import F32, F64, I32, I64, Bools
-from mapping.voxels import query, store
+from mapping.voxels import blocks, query, store
 from mapping.voxels.checks import (
     checked_model,
     checked_origin,
@@ -98,7 +98,7 @@ class VoxelMap:
         ends = np.empty((max(1, len(points)), 3))
         grid = self._grid_around(origin, reach_m)
         truths = checked_truths(explained, len(points))
-        store.begin_scan(self._store)
+        blocks.begin_scan(self._store)
         n_ends = mark_points(self._store, grid, points, truths, self._resolution_m, origin, reach_m, discretize, ends)
         reached = mark_rays(self._store, grid, ends, n_ends, self._resolution_m, origin, reach_m)
         if grid.side:
@@ -111,7 +111,7 @@ class VoxelMap:
         points = checked_points(points_enu)
         truths = checked_truths(explained, len(points))
         no_rays = np.empty((0, 3))
-        store.begin_scan(self._store)
+        blocks.begin_scan(self._store)
         mark_points(self._store, NO_GRID, points, truths, self._resolution_m, np.zeros(3), math.inf, False, no_rays)
         apply_blocks(self._store, self._model)
 
@@ -173,7 +173,7 @@ class VoxelMap:
 
     def clear(self) -> None:
         """Forgets all voxels and what was refused; the memory is kept for those to come."""
-        store.empty(self._store)
+        blocks.empty(self._store)
         self._emptied_at = self.revision
 
     def centres(self, keys: ArrayLike) -> F64:
@@ -210,8 +210,8 @@ class VoxelMap:
 
     @property
     def is_full(self) -> bool:
-        """No further block of voxels finds room."""
-        return int(self._store.counts[store.N_BLOCKS]) == len(self._store.keys)
+        """What is not known yet finds no room any more, at least not everywhere."""
+        return blocks.is_full(self._store)
 
     @property
     def refused_updates(self) -> int:

@@ -9,19 +9,21 @@ import numpy as np
 from numba import njit
 
 from mapping.geometry.arrays import U8
+from mapping.voxels.blocks import touch, voxel_in
 from mapping.voxels.store import (
     HIT,
-    IN_BLOCK,
     N_REFUSED,
     SIDE_BITS,
     UNEXPLAINED_HIT,
-    touch,
+    VOXELS,
 )
 
 LARGEST_KEY = 1 << 30
 """Farther out keys would not fit in 32 bits."""
 MAX_RANGE_VOXELS = 1 << 15
 """How far a ray may go, as in OctoMap."""
+HIT_WORDS, UNEXPLAINED_WORDS = VOXELS // 64, 2 * VOXELS // 64
+"""Where these begin in a page of marks."""
 
 
 class Grid(NamedTuple):
@@ -54,6 +56,7 @@ def mark_points(store, grid, points, unexplained, resolution, origin, max_range,
     scale = 1.0 / resolution
     ox, oy, oz = origin[0], origin[1], origin[2]
     reach_sq = max_range * max_range
+    marks, pages, counts = grid.marks, store.marks, store.counts
     in_grid, wanted = grid.side > 0, ends.shape[0] > 0
     one_verdict = unexplained.size == 1
     others = np.empty(points.shape[0] if wanted and discretize else 0, np.int64)
@@ -72,16 +75,19 @@ def mark_points(store, grid, points, unexplained, resolution, origin, max_range,
             hit = HIT | UNEXPLAINED_HIT if unexplained[0 if one_verdict else i] else HIT
             if in_grid:
                 place = ((z - grid.z0) * grid.side + y - grid.y0) * grid.side + x - grid.x0
-                fresh = grid.marks[place] & HIT == 0
-                grid.marks[place] |= np.uint8(hit)
+                fresh = marks[place] & HIT == 0
+                marks[place] |= np.uint8(hit)
             else:
                 page = touch(store, x >> SIDE_BITS, y >> SIDE_BITS, z >> SIDE_BITS)
                 if page >= 0:
-                    voxel = (z & IN_BLOCK) << 6 | (y & IN_BLOCK) << 3 | (x & IN_BLOCK)
-                    fresh = store.marks[page, voxel] & HIT == 0
-                    store.marks[page, voxel] |= np.uint8(hit)
+                    voxel = voxel_in(x, y, z)
+                    word, bit = voxel >> 6, np.uint64(1) << np.uint64(voxel & 63)
+                    fresh = pages[page, HIT_WORDS + word] & bit == 0
+                    pages[page, HIT_WORDS + word] |= bit
+                    if hit & UNEXPLAINED_HIT:
+                        pages[page, UNEXPLAINED_WORDS + word] |= bit
                 else:
-                    store.counts[N_REFUSED] += 1
+                    counts[N_REFUSED] += 1
                     seen = False
         if not wanted:
             continue

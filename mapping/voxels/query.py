@@ -7,12 +7,15 @@ import math
 import numpy as np
 from numba import njit
 
+from mapping.voxels.blocks import find, place_in, place_of, state_of, voxel_in
 from mapping.voxels.marks import LARGEST_KEY
 from mapping.voxels.store import (
+    BRICK,
+    BRICKS,
     CELL_EVER_HIT,
     CELL_EXPLAINED,
     CELL_LISTED,
-    IN_BLOCK,
+    CHUNK_BITS,
     LOG_MASK,
     N_BLOCKS,
     OCCUPIED,
@@ -20,8 +23,6 @@ from mapping.voxels.store import (
     SIDE_BITS,
     VALUE,
     VOXELS,
-    find,
-    state_of,
 )
 
 
@@ -41,8 +42,9 @@ def voxels_of(store, points, resolution):
             block = find(store, bx, by, bz)
             last_x, last_y, last_z = bx, by, bz
         if block >= 0:
-            voxel = (z & IN_BLOCK) << 6 | (y & IN_BLOCK) << 3 | (x & IN_BLOCK)
-            if store.cells[block, voxel] & VALUE:
+            voxel = voxel_in(x, y, z)
+            place = place_of(store, block, voxel)
+            if place >= 0 and store.cells[place] & VALUE:
                 found[i] = block * VOXELS + voxel
     return found
 
@@ -50,24 +52,30 @@ def voxels_of(store, points, resolution):
 @njit(cache=True, nogil=True)
 def list_voxels(store, mask, value):
     """(N,) numbers of all voxels whose state under ``mask`` is ``value``."""
-    count = 0
-    blocks = store.counts[N_BLOCKS]
-    only_occupied = value & OCCUPIED != 0
-    for block in range(blocks):
-        if only_occupied and store.occupied[block] == 0:
-            continue
-        for voxel in range(VOXELS):
-            count += state_of(store, block, voxel) & mask == value
-    found = np.empty(count, np.int64)
+    found = np.empty(_list_voxels(store, mask, value, np.empty(0, np.int64)), np.int64)
+    return found[: _list_voxels(store, mask, value, found)]
+
+
+@njit(cache=True, nogil=True)
+def _list_voxels(store, mask, value, found):
+    """How many there are; as many as find room are written into ``found``."""
+    cells, bricks, chunks, kinds, occupied = store.cells, store.bricks, store.chunks, store.kinds, store.occupied
     n = 0
-    for block in range(blocks):
-        if only_occupied and store.occupied[block] == 0:
+    only_occupied = value & OCCUPIED != 0
+    for block in range(store.counts[N_BLOCKS]):
+        if only_occupied and occupied[block] == 0:
             continue
-        for voxel in range(VOXELS):
-            if n < count and state_of(store, block, voxel) & mask == value:
-                found[n] = block * VOXELS + voxel
-                n += 1
-    return found[:n]
+        for brick in range(BRICKS):
+            slot = np.int64(bricks[block, brick])
+            if slot == 0:
+                continue
+            first = place_in(chunks[block, (slot - 1) >> CHUNK_BITS], slot)
+            for i in range(BRICK):
+                if state_of(kinds, np.int64(cells[first + i])) & mask == value:
+                    if n < found.size:
+                        found[n] = block * VOXELS + brick * BRICK + i
+                    n += 1
+    return n
 
 
 @njit(cache=True, nogil=True)
@@ -80,14 +88,15 @@ def list_changes(store, revision, ever_hit_only):
     for r in range(now - 1, revision - 1, -1):
         number = np.int64(store.log[r & ring])
         block, voxel = number // VOXELS, number % VOXELS
-        cell = store.cells[block, voxel]
+        place = place_of(store, block, voxel)
+        cell = store.cells[place]
         if cell & CELL_LISTED or (ever_hit_only and not cell & CELL_EVER_HIT):
             continue
-        store.cells[block, voxel] = cell | CELL_LISTED
+        store.cells[place] = cell | CELL_LISTED
         found[n] = number
         n += 1
     for i in range(n):
-        store.cells[found[i] // VOXELS, found[i] % VOXELS] &= np.uint16(0xFFFF ^ CELL_LISTED)
+        store.cells[place_of(store, found[i] // VOXELS, found[i] % VOXELS)] &= np.uint16(0xFFFF ^ CELL_LISTED)
     return found[:n]
 
 
@@ -99,10 +108,11 @@ def describe(store, numbers):
     explained = np.empty(numbers.size, np.bool_)
     for i in range(numbers.size):
         block, voxel = numbers[i] // VOXELS, numbers[i] % VOXELS
-        keys[i, 0] = store.keys[block, 0] * 8 + (voxel & IN_BLOCK)
-        keys[i, 1] = store.keys[block, 1] * 8 + (voxel >> 3 & IN_BLOCK)
-        keys[i, 2] = store.keys[block, 2] * 8 + (voxel >> 6)
-        cell = store.cells[block, voxel]
+        keys[i, 0] = store.keys[block, 0] * 8 + (voxel >> 2 & 6 | voxel & 1)
+        keys[i, 1] = store.keys[block, 1] * 8 + (voxel >> 4 & 6 | voxel >> 1 & 1)
+        keys[i, 2] = store.keys[block, 2] * 8 + (voxel >> 6 & 6 | voxel >> 2 & 1)
+        place = place_of(store, block, voxel)
+        cell = np.int64(store.cells[place]) if place >= 0 else 0
         log_odds[i] = store.values[cell & VALUE]
         explained[i] = cell & CELL_EXPLAINED != 0
     return keys, log_odds, explained

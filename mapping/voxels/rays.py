@@ -7,7 +7,12 @@ import math
 import numpy as np
 from numba import njit
 
-from mapping.voxels.store import IN_BLOCK, MISS, N_REFUSED, SIDE_BITS, touch
+from mapping.voxels.blocks import touch, voxel_in
+from mapping.voxels.store import (
+    MISS,
+    N_REFUSED,
+    SIDE_BITS,
+)
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -94,13 +99,15 @@ def _walk_grid(grid, x, y, z, sx, sy, sz, tx, ty, tz, gx, gy, gz, steps, length)
 @njit(cache=True, nogil=True)
 def _walk_blocks(store, x, y, z, sx, sy, sz, tx, ty, tz, gx, gy, gz, steps, length):
     """One ray through pages of marks: for scans that are too wide for a grid."""
+    pages = store.marks
     bx, by, bz, page = (x >> SIDE_BITS) + 1, 0, 0, -1
     for _ in range(steps):
         if x >> SIDE_BITS != bx or y >> SIDE_BITS != by or z >> SIDE_BITS != bz:
             bx, by, bz = x >> SIDE_BITS, y >> SIDE_BITS, z >> SIDE_BITS
             page = touch(store, bx, by, bz)
         if page >= 0:
-            store.marks[page, (z & IN_BLOCK) << 6 | (y & IN_BLOCK) << 3 | (x & IN_BLOCK)] |= np.uint8(MISS)
+            voxel = voxel_in(x, y, z)
+            pages[page, voxel >> 6] |= np.uint64(1) << np.uint64(voxel & 63)
         else:
             store.counts[N_REFUSED] += 1
         if min(tx, ty, tz) > length:

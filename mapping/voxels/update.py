@@ -8,14 +8,20 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from mapping.voxels.blocks import find_or_make, make_brick, place_in, place_of, voxel_in
+from mapping.voxels.marks import HIT_WORDS, UNEXPLAINED_WORDS
 from mapping.voxels.store import (
+    BRICK,
+    BRICK_BITS,
+    BRICKS,
     CELL_EVER_HIT,
     CELL_EXPLAINED,
     CELL_TRUTHS,
+    CHUNK_BITS,
     HIT,
-    IN_BLOCK,
     KNOWN,
     LOG_MASK,
+    MISS,
     N_EXPLAINED,
     N_KNOWN,
     N_OCCUPIED,
@@ -24,12 +30,10 @@ from mapping.voxels.store import (
     N_VALUES,
     OCCUPIED,
     REVISION,
-    SIDE,
     SIDE_BITS,
     UNEXPLAINED_HIT,
     VALUE,
     VOXELS,
-    find_or_make,
 )
 
 
@@ -83,68 +87,127 @@ def begin_values(store, model):
 
 
 @njit(cache=True, nogil=True)
-def put(store, block, voxel, cell):
-    """Gives one voxel its new cell; counts, and logs it when that changes anything."""
-    old = np.int64(store.cells[block, voxel])
+def _number_after_hit(store, model, number):
+    after = number_of(store, model, min(store.values[number] + model.hit, model.highest))
+    store.after_hit[number] = after
+    return after
+
+
+@njit(cache=True, nogil=True)
+def _number_after_miss(store, model, number):
+    after = number_of(store, model, max(store.values[number] + model.miss, model.lowest))
+    if after == number and store.values[number] > model.lowest:
+        after = _next_lower(store, number)
+    store.after_miss[number] = after
+    return after
+
+
+@njit(cache=True, nogil=True)
+def _put(store, block, voxel, place, cell):
+    """Gives the voxel whose cell is at ``place`` its new one; counts, and logs it when that changes anything."""
+    old = np.int64(store.cells[place])
     if cell == old:
         return
-    store.cells[block, voxel] = cell
+    store.cells[place] = cell
     counts = store.counts
     was, now = np.int64(store.kinds[old & VALUE]), np.int64(store.kinds[cell & VALUE])
     counts[N_KNOWN] += (now & KNOWN) - (was & KNOWN)
     more = ((now & OCCUPIED) - (was & OCCUPIED)) // OCCUPIED
     counts[N_OCCUPIED] += more
     store.occupied[block] += more
-    both_now = now & OCCUPIED != 0 and cell & CELL_EXPLAINED != 0
-    both_before = was & OCCUPIED != 0 and old & CELL_EXPLAINED != 0
-    counts[N_EXPLAINED] += int(both_now) - int(both_before)
+    counts[N_EXPLAINED] += _both(now, cell) - _both(was, old)
     store.log[counts[REVISION] & counts[LOG_MASK]] = block * VOXELS + voxel
     counts[REVISION] += 1
 
 
-@njit(cache=True, nogil=True)
-def apply_mark(store, model, block, voxel, mark):
-    """One voxel, once per scan: a hit where any point lay in it, else a miss.
+@njit(cache=True, nogil=True, inline="always")
+def _both(kind, cell):
+    """1 where a voxel is occupied and explained."""
+    return (kind & OCCUPIED) // OCCUPIED & (cell & CELL_EXPLAINED) // CELL_EXPLAINED
 
-    A voxel counts as explained when the scan that hit it first had nothing but explained points in it, until an
-    unexplained point hits it.
+
+@njit(cache=True, nogil=True)
+def _apply_block(store, model, block, marks):
+    """The marks of a block's bricks (64,), a byte for each voxel, the first one's lowest; they are zeros then.
+
+    Each voxel once per scan: a hit where any point lay in it, else a miss. A voxel counts as explained when the scan
+    that hit it first had nothing but explained points in it, until an unexplained point hits it. Voxels without room
+    are counted. What ``_put`` does is written out here: a call for each voxel takes ten times as long.
     """
-    cell = np.int64(store.cells[block, voxel])
-    number, truths = cell & VALUE, cell & CELL_TRUTHS
-    if mark & HIT:
-        after = np.int64(store.after_hit[number])
-        if after == 0:
-            after = number_of(store, model, min(store.values[number] + model.hit, model.highest))
-            store.after_hit[number] = after
-        if mark & UNEXPLAINED_HIT:
-            truths &= ~CELL_EXPLAINED
-        elif not truths & CELL_EVER_HIT:
-            truths |= CELL_EXPLAINED
-        put(store, block, voxel, after | truths | CELL_EVER_HIT)
-    else:
-        after = np.int64(store.after_miss[number])
-        if after == 0:
-            after = number_of(store, model, max(store.values[number] + model.miss, model.lowest))
-            if after == number and store.values[number] > model.lowest:
-                after = _next_lower(store, number)
-            store.after_miss[number] = after
-        put(store, block, voxel, after | truths)
+    cells, bricks, chunks, kinds, log = store.cells, store.bricks, store.chunks, store.kinds, store.log
+    after_hit, after_miss, counts = store.after_hit, store.after_miss, store.counts
+    revision, ring = counts[REVISION], counts[LOG_MASK]
+    known, occupied, explained = 0, 0, 0
+    for brick in range(BRICKS):
+        word = marks[brick]
+        if word == 0:
+            continue
+        marks[brick] = 0
+        slot = np.int64(bricks[block, brick]) if block >= 0 else 0
+        if slot == 0:
+            slot = make_brick(store, block, brick) if block >= 0 else 0
+        if slot == 0:
+            for i in range(BRICK):
+                counts[N_REFUSED] += int(word >> np.uint64(8 * i) & np.uint64(0xFF) != 0)
+            continue
+        first = place_in(chunks[block, (slot - 1) >> CHUNK_BITS], slot)
+        for i in range(BRICK):
+            mark = np.int64(word >> np.uint64(8 * i) & np.uint64(0xFF))
+            if mark == 0:
+                continue
+            old = np.int64(cells[first + i])
+            number, truths = old & VALUE, old & CELL_TRUTHS
+            if mark & HIT:
+                after = np.int64(after_hit[number])
+                if after == 0:
+                    after = _number_after_hit(store, model, number)
+                if mark & UNEXPLAINED_HIT:
+                    truths &= ~CELL_EXPLAINED
+                elif not truths & CELL_EVER_HIT:
+                    truths |= CELL_EXPLAINED
+                truths |= CELL_EVER_HIT
+            else:
+                after = np.int64(after_miss[number])
+                if after == 0:
+                    after = _number_after_miss(store, model, number)
+            cell = after | truths
+            if cell == old:
+                continue
+            cells[first + i] = cell
+            was, now = np.int64(kinds[number]), np.int64(kinds[after])
+            known += (now & KNOWN) - (was & KNOWN)
+            occupied += ((now & OCCUPIED) - (was & OCCUPIED)) // OCCUPIED
+            explained += _both(now, cell) - _both(was, old)
+            log[revision & ring] = block * VOXELS + brick * BRICK + i
+            revision += 1
+    if block >= 0:
+        store.occupied[block] += occupied
+    counts[N_KNOWN] += known
+    counts[N_OCCUPIED] += occupied
+    counts[N_EXPLAINED] += explained
+    counts[REVISION] = revision
 
 
 @njit(cache=True, nogil=True)
 def apply_blocks(store, model):
     """Third step of a scan without a grid: the marks in the blocks' pages, which are zeros then."""
-    words = store.marks.view(np.uint64)
+    marks, pages = np.zeros(BRICKS, np.uint64), store.marks
     for page in range(store.counts[N_TOUCHED]):
-        block = store.touched[page]
-        for w in range(VOXELS // 8):
-            if words[page, w] == 0:
-                continue
-            for voxel in range(8 * w, 8 * w + 8):
-                mark = store.marks[page, voxel]
-                if mark:
-                    apply_mark(store, model, block, voxel, mark)
-            words[page, w] = 0
+        for brick in range(BRICKS):
+            word, shift = brick // 8, np.uint64(brick % 8 * 8)
+            misses = _spread(pages[page, word] >> shift)
+            hits = _spread(pages[page, HIT_WORDS + word] >> shift)
+            unexplained = _spread(pages[page, UNEXPLAINED_WORDS + word] >> shift)
+            marks[brick] = misses * np.uint64(MISS) | hits * np.uint64(HIT) | unexplained * np.uint64(UNEXPLAINED_HIT)
+        pages[page, :] = 0
+        _apply_block(store, model, store.touched[page], marks)
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _spread(bits):
+    """The eight lowest bits as eight bytes of 0 or 1, lowest first."""
+    seven = (bits & np.uint64(0x7F)) * np.uint64(0x0002040810204081) & np.uint64(0x0101010101010101)
+    return seven | (bits >> np.uint64(7) & np.uint64(1)) << np.uint64(56)
 
 
 @njit(cache=True, nogil=True)
@@ -154,28 +217,39 @@ def apply_grid(store, model, grid, reached):
     ``reached`` (2, 3) are the lowest and the highest key with a mark. Voxels without room are counted.
     """
     words = grid.marks.view(np.uint64)
+    marks = np.zeros(BRICKS, np.uint64)
     row = grid.side >> SIDE_BITS
     for bz in range(reached[0, 2] >> SIDE_BITS, (reached[1, 2] >> SIDE_BITS) + 1):
         for by in range(reached[0, 1] >> SIDE_BITS, (reached[1, 1] >> SIDE_BITS) + 1):
             y, z = (by << SIDE_BITS) - grid.y0, (bz << SIDE_BITS) - grid.z0
             for bx in range(reached[0, 0] >> SIDE_BITS, (reached[1, 0] >> SIDE_BITS) + 1):
                 first = (z * grid.side + y) * row + bx - (grid.x0 >> SIDE_BITS)
-                block = -2
-                for r in range(SIDE * SIDE):
-                    word = first + ((r >> SIDE_BITS) * grid.side + (r & IN_BLOCK)) * row
-                    if words[word] == 0:
-                        continue
-                    if block == -2:
-                        block = find_or_make(store, bx, by, bz)
-                    for i in range(SIDE):
-                        mark = grid.marks[word * SIDE + i]
-                        if mark == 0:
-                            continue
-                        if block >= 0:
-                            apply_mark(store, model, block, r * SIDE + i, mark)
-                        else:
-                            store.counts[N_REFUSED] += 1
-                    words[word] = 0
+                if _take_block(words, first, row, grid.side * row, marks):
+                    _apply_block(store, model, find_or_make(store, bx, by, bz), marks)
+
+
+@njit(cache=True, nogil=True)
+def _take_block(words, first, row, layer, marks):
+    """Takes a block's marks out of the grid, brick by brick; whether there are any.
+
+    The words of a block begin at ``first``, eight voxels each; ``row`` and ``layer`` words on the next row and layer.
+    """
+    any_there = False
+    for four in range(0, BRICKS, 4):
+        # Four bricks side by side are four rows of eight voxels: two of one layer, two of the next.
+        near = first + 2 * ((four >> 4) * layer + (four >> 2 & 3) * row)
+        above = near + layer
+        a, b, c, d = words[near], words[near + row], words[above], words[above + row]
+        if a | b | c | d == 0:
+            continue
+        any_there = True
+        for n in range(4):
+            shift, pair = np.uint64(16 * n), np.uint64(0xFFFF)
+            low = a >> shift & pair | (b >> shift & pair) << np.uint64(16)
+            high = c >> shift & pair | (d >> shift & pair) << np.uint64(16)
+            marks[four + n] = low | high << np.uint64(32)
+        words[near], words[near + row], words[above], words[above + row] = 0, 0, 0, 0
+    return any_there
 
 
 @njit(cache=True, nogil=True)
@@ -185,16 +259,16 @@ def assign(store, model, points, occupied, resolution):
     highest, lowest = number_of(store, model, model.highest), number_of(store, model, model.lowest)
     for i in range(points.shape[0]):
         x, y, z = math.floor(points[i, 0] * scale), math.floor(points[i, 1] * scale), math.floor(points[i, 2] * scale)
-        block = find_or_make(store, x >> SIDE_BITS, y >> SIDE_BITS, z >> SIDE_BITS)
-        if block < 0:
+        block, voxel = find_or_make(store, x >> SIDE_BITS, y >> SIDE_BITS, z >> SIDE_BITS), voxel_in(x, y, z)
+        if block < 0 or make_brick(store, block, voxel >> BRICK_BITS) == 0:
             store.counts[N_REFUSED] += 1
             continue
-        voxel = (z & IN_BLOCK) << 6 | (y & IN_BLOCK) << 3 | (x & IN_BLOCK)
-        truths = np.int64(store.cells[block, voxel]) & CELL_TRUTHS
+        place = place_of(store, block, voxel)
+        truths = np.int64(store.cells[place]) & CELL_TRUTHS
         if occupied[i]:
-            put(store, block, voxel, highest | (truths & ~CELL_EXPLAINED) | CELL_EVER_HIT)
+            _put(store, block, voxel, place, highest | (truths & ~CELL_EXPLAINED) | CELL_EVER_HIT)
         else:
-            put(store, block, voxel, lowest | truths)
+            _put(store, block, voxel, place, lowest | truths)
 
 
 @njit(cache=True, nogil=True)
@@ -204,5 +278,6 @@ def mark_explained(store, numbers, explained):
         if numbers[i] < 0:
             continue
         block, voxel = numbers[i] // VOXELS, numbers[i] % VOXELS
-        cell = np.int64(store.cells[block, voxel]) & ~CELL_EXPLAINED
-        put(store, block, voxel, cell | CELL_EXPLAINED if explained[i] else cell)
+        place = place_of(store, block, voxel)
+        cell = np.int64(store.cells[place]) & ~CELL_EXPLAINED
+        _put(store, block, voxel, place, cell | CELL_EXPLAINED if explained[i] else cell)

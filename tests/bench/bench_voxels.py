@@ -15,7 +15,7 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from mapping.perceiving.roi import search_sector, sector_points, to_enu
 from mapping.voxels.map import VoxelMap
-from tests.mapping.clouds import seen_by_camera
+from tests.mapping.clouds import forest_clouds, seen_by_camera
 from tests.reference.octomap import octree
 
 RESOLUTION_M, RANGE_M = 0.5, 40.0
@@ -31,7 +31,7 @@ def cases() -> list[Case]:
     """The figures of `make bench` for the voxel maps."""
     clouds = {"a camera's cloud": seen_by_camera, "points all around": _all_around}
     rows = [_insert(name, make(count)) for count in (100_000, 1_000_000) for name, make in clouds.items()]
-    return [*rows, _search()]
+    return [*rows, _insert_forest(), _search()]
 
 
 def main() -> None:
@@ -57,6 +57,30 @@ def _insert(name: str, points: F64) -> Case:
     note = f"{voxels.voxel_count:,} voxels, {each_bytes:.1f} bytes each (at least 10 times: {enough})"
     title = f"insert {len(points):,} points, {name}, into an empty map of {RESOLUTION_M} m, {RANGE_M:.0f} m"
     return f"{title}, against OctoMap with discretize", ours_s, theirs_s, theirs_s / ours_s, note
+
+
+def _insert_forest() -> Case:
+    """Of which a block is known to a fifth."""
+    scans, range_m = forest_clouds(4), 50.0
+
+    def ours() -> VoxelMap:
+        voxels = VoxelMap(resolution_m=0.2)
+        for points, origin in scans:
+            voxels.insert(points, origin_enu=origin, max_range_m=range_m)
+        return voxels
+
+    def theirs() -> Any:
+        tree = octree(0.2)
+        for points, origin in scans:
+            tree.insertPointCloud(points, origin, range_m, False, True)
+        return tree
+
+    ours_s, voxels = _best_of(5, ours)
+    theirs_s, _ = _best_of(1, theirs)
+    each_bytes = voxels.size_bytes / voxels.voxel_count
+    note = f"{voxels.voxel_count:,} voxels, {each_bytes:.1f} bytes each (at most 8: {_yes(8.0, each_bytes)})"
+    title = "insert 4 scans of a laser with 64 beams in a forest, 0.2 m, 50 m, against OctoMap with discretize"
+    return title, ours_s, theirs_s, theirs_s / ours_s, note
 
 
 def _search() -> Case:

@@ -39,6 +39,35 @@ def seen_by_camera(count: int, seed: int = 0) -> F64:
     return np.column_stack([level_m * np.sin(azimuth), level_m * np.cos(azimuth), range_m * np.sin(elevation)])
 
 
+def forest_clouds(count: int, seed: int = 0) -> list[tuple[F64, F64]]:
+    """Scans of a laser with 64 beams, carried 1.8 m over the ground of a forest, 2 m between them.
+
+    Trunks of 0.15-0.4 m, one on 25 m2; leaves stop a fifth of the rays anywhere.
+    """
+    rng = np.random.default_rng(seed)
+    trunks = rng.uniform((-110.0, -80.0), (110.0, 80.0), (1_400, 2))
+    radii_m = rng.uniform(0.15, 0.4, len(trunks))
+    azimuth, elevation = np.linspace(-np.pi, np.pi, 900, endpoint=False), np.radians(np.linspace(-24.8, 15.0, 64))
+    towards = np.column_stack([np.cos(azimuth), np.sin(azimuth)])
+    ground_m = np.where(elevation < 0.0, -1.8 / np.tan(np.minimum(elevation, -1e-6)), np.inf)
+    scans = []
+    for n in range(count):
+        origin = np.array([2.0 * n - count + 0.013, 0.017, 1.8])
+        apart = trunks - origin[:2]
+        along, aside = towards @ apart.T, towards[:, :1] * apart[:, 1] - towards[:, 1:] * apart[:, 0]
+        struck = (np.abs(aside) < radii_m) & (along > 0.5)
+        trunk_m = np.where(struck, along - np.sqrt(np.maximum(radii_m**2 - aside**2, 0.0)), np.inf).min(axis=1)
+        level_m = np.minimum(ground_m[:, None], trunk_m[None, :])
+        leaf_m = np.where(rng.random(level_m.shape) < 0.2, rng.exponential(15.0, level_m.shape) + 1.0, np.inf)
+        level_m = np.minimum(level_m, leaf_m)
+        level_m += rng.normal(0.0, 0.02, level_m.shape)
+        seen = level_m < 100.0
+        up_m = level_m * np.tan(elevation)[:, None]
+        x, y = level_m * towards[:, 0], level_m * towards[:, 1]
+        scans.append((np.column_stack([x[seen], y[seen], up_m[seen]]) + origin, origin))
+    return scans
+
+
 def _placed(points: F64, pose: F64) -> tuple[F64, F64]:
     return points @ pose[:3, :3].T + pose[:3, 3], pose[:3, 3]
 
