@@ -18,12 +18,14 @@ from mapping.voxels.checks import (
     checked_size,
     checked_truths,
 )
-from mapping.voxels.marks import NO_GRID, Grid, mark_points
+from mapping.voxels.marks import NO_GRID, Grid, box_around, mark_points
 from mapping.voxels.rays import mark_rays
 from mapping.voxels.update import apply_blocks, apply_grid, assign, begin_values, mark_explained
 
-LARGEST_GRID = 512
-"""Voxels a side: 134 MB are set aside, of which a scan fills what its rays cross."""
+LARGEST_GRID = 512**3
+"""Voxels: 134 MB are set aside, of which a scan fills what its rays cross; never more than the map itself may have."""
+VOXELS_FOR_A_STEP = 8
+"""How many voxels of a grid are looked through in the time that a ray's way across it takes longer without one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +74,7 @@ class VoxelMap:
         self._model = checked_model(prob_hit, prob_miss, clamp, occupied)
         self._store = store.make_store(memory_limit_bytes)
         begin_values(self._store, self._model)
-        self._resolution_m = float(resolution_m)
+        self._resolution_m, self._memory_limit_bytes = float(resolution_m), int(memory_limit_bytes)
         self._marks = np.zeros(0, np.uint8)
         self._emptied_at = 0
 
@@ -96,12 +98,12 @@ class VoxelMap:
         origin = checked_origin(origin_enu, self._resolution_m)
         reach_m = checked_range(max_range_m, self._resolution_m)
         ends = np.empty((max(1, len(points)), 3))
-        grid = self._grid_around(origin, reach_m)
+        grid = self._grid_around(points, origin, reach_m)
         truths = checked_truths(explained, len(points))
         blocks.begin_scan(self._store)
         n_ends = mark_points(self._store, grid, points, truths, self._resolution_m, origin, reach_m, discretize, ends)
         reached = mark_rays(self._store, grid, ends, n_ends, self._resolution_m, origin, reach_m)
-        if grid.side:
+        if grid.size_x:
             apply_grid(self._store, self._model, grid, reached)
         else:
             apply_blocks(self._store, self._model)
@@ -226,14 +228,21 @@ class VoxelMap:
     def _numbers(self, points_enu: ArrayLike) -> I64:
         return query.voxels_of(self._store, checked_points(points_enu), self._resolution_m)
 
-    def _grid_around(self, origin: F64, reach_m: float) -> Grid:
-        side = store.SIDE * (2 * math.ceil(reach_m / self._resolution_m / store.SIDE) + 4)
-        if side > LARGEST_GRID:
+    def _grid_around(self, points: F64, origin: F64, reach_m: float) -> Grid:
+        """All that can be reached where that is small enough, else the box that these points need; else none."""
+        grid = self._grid(np.stack([origin - reach_m, origin + reach_m]), math.inf)
+        return grid if grid.size_x else self._grid(box_around(points, origin, reach_m), len(points))
+
+    def _grid(self, box: F64, rays: float) -> Grid:
+        """None where looking through a box costs more than it spares so few ``rays``."""
+        lowest, highest = np.floor(box / (self._resolution_m * store.SIDE)).astype(np.int64).tolist()
+        x, y, z = (store.SIDE * (high - low + 3) for low, high in zip(lowest, highest, strict=True))
+        largest = min(LARGEST_GRID, self._memory_limit_bytes)
+        if x * y * z > min(largest, VOXELS_FOR_A_STEP * rays * (x + y + z)):
             return NO_GRID
-        if len(self._marks) != side**3:
-            self._marks = np.zeros(side**3, np.uint8)
-        lowest = np.floor((origin - reach_m) / self._resolution_m / store.SIDE).astype(np.int64) - 1
-        return Grid(self._marks, side, *(lowest * store.SIDE).tolist())
+        if len(self._marks) < x * y * z:
+            self._marks = np.zeros(min(largest, x * y * z * 5 // 4) // 8 * 8, np.uint8)
+        return Grid(self._marks, x, y, *((low - 1) * store.SIDE for low in lowest))
 
 
 def _probability(log_odds: F32) -> F32:

@@ -29,20 +29,36 @@ HIT_WORDS, UNEXPLAINED_WORDS = VOXELS // 64, 2 * VOXELS // 64
 class Grid(NamedTuple):
     """A byte for every voxel around the sensor: where the rays of an ordinary scan cross, so that nothing is looked up.
 
-    A scan that is too wide for it (length 0) leaves its marks in pages, one per block: slower, the same outcome.
+    A scan that is too wide for it (``size_x`` 0) leaves its marks in pages, one per block: slower, the same outcome.
     """
 
     marks: U8
-    """(side^3,) MISS, HIT, UNEXPLAINED_HIT at (z * side + y) * side + x; zeros between scans"""
-    side: int
-    """A multiple of 8."""
+    """MISS, HIT, UNEXPLAINED_HIT at (z * size_y + y) * size_x + x; zeros between scans"""
+    size_x: int
+    """Voxels, a multiple of 8."""
+    size_y: int
     x0: int
     """Key of its lowest voxel, multiples of 8."""
     y0: int
     z0: int
 
 
-NO_GRID = Grid(np.zeros(0, np.uint8), 0, 0, 0, 0)
+NO_GRID = Grid(np.zeros(0, np.uint8), 0, 0, 0, 0, 0)
+
+
+@njit(cache=True, nogil=True)
+def box_around(points, origin, max_range):
+    """Lowest and highest corner (2, 3) of where rays from ``origin`` to ``points`` (N, 3) can lead."""
+    box = np.empty((2, 3))
+    for axis in range(3):
+        lowest, highest = origin[axis] - max_range, origin[axis] + max_range
+        box[0, axis], box[1, axis] = origin[axis], origin[axis]
+        for i in range(points.shape[0]):
+            value = points[i, axis]
+            if abs(value) < np.inf:
+                box[0, axis] = min(box[0, axis], max(value, lowest))
+                box[1, axis] = max(box[1, axis], min(value, highest))
+    return box
 
 
 @njit(cache=True, nogil=True)
@@ -57,7 +73,7 @@ def mark_points(store, grid, points, unexplained, resolution, origin, max_range,
     ox, oy, oz = origin[0], origin[1], origin[2]
     reach_sq = max_range * max_range
     marks, pages, counts = grid.marks, store.marks, store.counts
-    in_grid, wanted = grid.side > 0, ends.shape[0] > 0
+    in_grid, wanted = grid.size_x > 0, ends.shape[0] > 0
     one_verdict = unexplained.size == 1
     others = np.empty(points.shape[0] if wanted and discretize else 0, np.int64)
     n_ends, n_others = 0, 0
@@ -74,7 +90,7 @@ def mark_points(store, grid, points, unexplained, resolution, origin, max_range,
         if seen:
             hit = HIT | UNEXPLAINED_HIT if unexplained[0 if one_verdict else i] else HIT
             if in_grid:
-                place = ((z - grid.z0) * grid.side + y - grid.y0) * grid.side + x - grid.x0
+                place = ((z - grid.z0) * grid.size_y + y - grid.y0) * grid.size_x + x - grid.x0
                 fresh = marks[place] & HIT == 0
                 marks[place] |= np.uint8(hit)
             else:

@@ -58,7 +58,7 @@ def mark_rays(store, grid, ends, n_ends, resolution, origin, max_range):
         sx, tx, gx = _first_border(ox, kx, resolution, dx)
         sy, ty, gy = _first_border(oy, ky, resolution, dy)
         sz, tz, gz = _first_border(oz, kz, resolution, dz)
-        if grid.side > 0:
+        if grid.size_x > 0:
             _walk_grid(grid, kx, ky, kz, sx, sy, sz, tx, ty, tz, gx, gy, gz, steps, length)
         else:
             _walk_blocks(store, kx, ky, kz, sx, sy, sz, tx, ty, tz, gx, gy, gz, steps, length)
@@ -69,8 +69,8 @@ def mark_rays(store, grid, ends, n_ends, resolution, origin, max_range):
 def _walk_grid(grid, x, y, z, sx, sy, sz, tx, ty, tz, gx, gy, gz, steps, length):
     """One ray through the grid. Branches, not selects: processors foresee the pattern of a straight line."""
     marks = grid.marks
-    sy, sz = sy * grid.side, sz * grid.side * grid.side
-    place = ((z - grid.z0) * grid.side + y - grid.y0) * grid.side + x - grid.x0
+    sy, sz = sy * grid.size_x, sz * grid.size_x * grid.size_y
+    place = ((z - grid.z0) * grid.size_y + y - grid.y0) * grid.size_x + x - grid.x0
     for _ in range(steps):
         marks[np.uint64(place)] |= np.uint8(MISS)
         if tx < ty:

@@ -218,13 +218,15 @@ def apply_grid(store, model, grid, reached):
     """
     words = grid.marks.view(np.uint64)
     marks = np.zeros(BRICKS, np.uint64)
-    row = grid.side >> SIDE_BITS
-    for bz in range(reached[0, 2] >> SIDE_BITS, (reached[1, 2] >> SIDE_BITS) + 1):
-        for by in range(reached[0, 1] >> SIDE_BITS, (reached[1, 1] >> SIDE_BITS) + 1):
+    row = grid.size_x >> SIDE_BITS
+    # A voxel more on each side: where a ray ends on a border, rounding may lead it across.
+    low, high = (reached[0] - 1) >> SIDE_BITS, (reached[1] + 1) >> SIDE_BITS
+    for bz in range(low[2], high[2] + 1):
+        for by in range(low[1], high[1] + 1):
             y, z = (by << SIDE_BITS) - grid.y0, (bz << SIDE_BITS) - grid.z0
-            for bx in range(reached[0, 0] >> SIDE_BITS, (reached[1, 0] >> SIDE_BITS) + 1):
-                first = (z * grid.side + y) * row + bx - (grid.x0 >> SIDE_BITS)
-                if _take_block(words, first, row, grid.side * row, marks):
+            for bx in range(low[0], high[0] + 1):
+                first = (z * grid.size_y + y) * row + bx - (grid.x0 >> SIDE_BITS)
+                if _take_block(words, first, row, grid.size_y * row, marks):
                     _apply_block(store, model, find_or_make(store, bx, by, bz), marks)
 
 

@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mapping.errors import CapacityError, ParameterError
+from mapping.voxels import map as map_module
 from mapping.voxels.map import VoxelMap
+from mapping.voxels.store import N_PAGES
 from tests.reference.octomap_rules import SlowMap
 
 SMALL_BYTES = 2_000_000
@@ -111,11 +113,16 @@ def test_a_map_moved_by_whole_voxels_is_the_same_map(points: np.ndarray, step: i
 
 @given(clouds)
 def test_a_scan_too_wide_for_the_grid_gives_the_same_map(points: np.ndarray) -> None:
-    a, b = small_map(), small_map()
-    for part in (points, points[:5]):
-        a.insert(part, origin_enu=ORIGIN, max_range_m=30.0)
-        b.insert(part, origin_enu=ORIGIN, max_range_m=math.inf)
-    assert content(a) == content(b)
+    around, boxed, paged = small_map(), small_map(), small_map()
+    for part in (points, points[:5], points[::3] * 0.7):
+        around.insert(part, origin_enu=ORIGIN, max_range_m=14.0)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(map_module, "VOXELS_FOR_A_STEP", math.inf)
+            boxed.insert(part, origin_enu=ORIGIN, max_range_m=math.inf)
+            patch.setattr(map_module, "LARGEST_GRID", 0)
+            paged.insert(part, origin_enu=ORIGIN, max_range_m=math.inf)
+    assert content(around) == content(boxed) == content(paged)
+    assert around.blocks.counts[N_PAGES] == boxed.blocks.counts[N_PAGES] == 0 < paged.blocks.counts[N_PAGES]
 
 
 @given(st.lists(clouds, min_size=2, max_size=4), st.integers(0, 3))

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mapping.voxels import map as map_module
 from mapping.voxels import store
 from mapping.voxels.map import VoxelMap
 from tests.mapping.clouds import car_clouds, forest_clouds, gicp_clouds
@@ -20,6 +21,8 @@ Key = tuple[int, ...]
 FARTHEST = (1 << 30) - 8
 """A voxel's key: the last block but one before keys end."""
 HIT, MISS, LOWEST, HIGHEST = (math.log(p / (1.0 - p)) for p in (0.7, 0.4, *CLAMP))
+
+STEPS = ["hits", "wide", "paged", "near", "assign", "free", "explain", "clear"]
 
 
 class PlainMap:
@@ -75,7 +78,7 @@ def along_axes(rng: np.random.Generator, centre: Key) -> tuple[list[Key], set[Ke
 @settings(max_examples=30)
 @given(
     st.integers(0, 1_000_000),
-    st.lists(st.sampled_from(["hits", "wide", "near", "assign", "free", "explain", "clear"]), min_size=3, max_size=12),
+    st.lists(st.sampled_from(STEPS), min_size=3, max_size=12),
     st.sampled_from([0, 1_000_000, -1_000_000]),
 )
 def test_whatever_is_done_to_a_map_it_is_the_plain_one(seed: int, steps: list[str], shift: int) -> None:
@@ -91,11 +94,14 @@ def test_whatever_is_done_to_a_map_it_is_the_plain_one(seed: int, steps: list[st
         elif step == "hits":
             voxels.insert_hits(points, explained=truths)
             plain.scan(keys, truths, set())
-        elif step in ("wide", "near"):
+        elif step in ("wide", "paged", "near"):
             ends, crossed = along_axes(rng, keys[0])
             truths = (rng.random(len(ends)) < 0.5).tolist()
-            origin, reach_m = voxels.centres([keys[0]])[0], math.inf if step == "wide" else 120.0
-            voxels.insert(voxels.centres(ends), origin_enu=origin, max_range_m=reach_m, explained=truths)
+            origin, reach_m = voxels.centres([keys[0]])[0], 20.5 if step == "near" else math.inf
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(map_module, "LARGEST_GRID", 0 if step == "paged" else map_module.LARGEST_GRID)
+                patch.setattr(map_module, "VOXELS_FOR_A_STEP", math.inf)
+                voxels.insert(voxels.centres(ends), origin_enu=origin, max_range_m=reach_m, explained=truths)
             plain.scan(ends, truths, crossed)
         elif step == "explain":
             voxels.mark_explained(keys, truths)
@@ -149,8 +155,9 @@ def test_no_map_takes_more_than_its_limit_and_none_loses_what_it_has(seed: int, 
             voxels.insert_hits(points)
             if not scattered:
                 origin = rng.uniform(-20.0, 20.0, 3)
-                reach_m = 150.0 if rng.integers(2) else math.inf
-                voxels.insert(points[:40], origin_enu=origin, max_range_m=reach_m)
+                with pytest.MonkeyPatch.context() as patch:
+                    patch.setattr(map_module, "LARGEST_GRID", int(rng.integers(2)) * map_module.LARGEST_GRID)
+                    voxels.insert(points[:40] / 3.0, origin_enu=origin / 3.0, max_range_m=math.inf)
             assert voxels.size_bytes <= limit_bytes
             assert_counts_agree(voxels)
             now = set(map(tuple, voxels.known()[0].tolist()))
