@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike
 from mapping.errors import CapacityError, ParameterError
 from mapping.geometry.arrays import F64, Bools
 from mapping.voxels.marks import LARGEST_KEY, MAX_RANGE_VOXELS
-from mapping.voxels.store import blocks_that_fit
+from mapping.voxels.store import WHOLE_BLOCK_BYTES, room_bytes
 from mapping.voxels.update import Model
 
 LEAST_BLOCKS = 16
+"""Known whole."""
 LEAST_EXTENT_M = 1_000.0
 """Keys must reach at least so far from the origin."""
 BYTES_PER_VOXEL = 3.2
@@ -32,7 +33,7 @@ def checked_size(resolution_m: float, reach_m: float | None, memory_limit_bytes:
             where="resolution_m",
             advice="Choose coarser voxels, for example 0.5 m.",
         )
-    if blocks_that_fit(int(memory_limit_bytes)) < LEAST_BLOCKS:
+    if room_bytes(int(memory_limit_bytes)) < LEAST_BLOCKS * WHOLE_BLOCK_BYTES:
         raise CapacityError(
             f"No map fits in {memory_limit_bytes:,.0f} bytes.",
             where="memory_limit_bytes",

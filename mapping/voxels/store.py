@@ -51,6 +51,7 @@ PAGE_WORDS = 3 * VOXELS // 64
 MOST_BLOCK_BYTES = BLOCK_BYTES + 8 * PAGE_WORDS + 32
 """With a page of marks and the table."""
 CHUNK_BYTES = 2 * PLACES
+WHOLE_BLOCK_BYTES = MOST_BLOCK_BYTES + BRICKS // CHUNK * CHUNK_BYTES
 VALUE_BYTES = 9
 ENTERED_AT_ONCE = 4
 """Blocks that come into a larger table with each new one: it is in use before the old one is two thirds full."""
@@ -107,12 +108,12 @@ class Store(NamedTuple):
 
 def blocks_that_fit(memory_limit_bytes: int) -> int:
     """How many blocks a map of so many bytes may hold, each with a page of marks, one chunk, its share of the table."""
-    return min(MAX_BLOCKS, _room_bytes(memory_limit_bytes) // (MOST_BLOCK_BYTES + CHUNK_BYTES))
+    return min(MAX_BLOCKS, room_bytes(memory_limit_bytes) // (MOST_BLOCK_BYTES + CHUNK_BYTES))
 
 
-def _room_bytes(memory_limit_bytes: int) -> int:
-    """For blocks and chunks."""
-    return memory_limit_bytes - 4 * log_length(memory_limit_bytes) - (VALUE + 1) * VALUE_BYTES
+def room_bytes(memory_limit_bytes: int) -> int:
+    """For blocks and chunks; the different log-odds, 74 kB where a map has all it can tell apart, come on top."""
+    return memory_limit_bytes - 4 * log_length(memory_limit_bytes)
 
 
 def log_length(memory_limit_bytes: int) -> int:
@@ -123,8 +124,8 @@ def log_length(memory_limit_bytes: int) -> int:
 
 def make_store(memory_limit_bytes: int) -> Store:
     """An empty store. Raises CapacityError when the system does not give the memory."""
-    blocks, room_bytes = blocks_that_fit(memory_limit_bytes), _room_bytes(memory_limit_bytes)
-    chunks = min(room_bytes // CHUNK_BYTES, blocks * (BRICKS // CHUNK))
+    blocks, room = blocks_that_fit(memory_limit_bytes), room_bytes(memory_limit_bytes)
+    chunks = min(room // CHUNK_BYTES, blocks * (BRICKS // CHUNK))
     longest_table, longest_log = 1 << (2 * blocks - 1).bit_length(), log_length(memory_limit_bytes)
     try:
         store = Store(
@@ -153,7 +154,7 @@ def make_store(memory_limit_bytes: int) -> Store:
             advice="Set a smaller limit.",
         ) from None
     store.counts[N_VALUES] = 1
-    store.counts[LIMIT_BYTES] = room_bytes
+    store.counts[LIMIT_BYTES] = room
     store.counts[TABLE_FIRST] = min(FIRST_TABLE, longest_table)
     store.counts[LOG_MASK] = min(FIRST_LOG, longest_log) - 1
     return store

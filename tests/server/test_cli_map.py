@@ -101,7 +101,7 @@ def test_another_resolution_and_memory_limit(recording: Path, tmp_path: Path) ->
     assert voxels[0] < voxels[1] < voxels[2]
     assert [found["points"] for found in (fine, coarse)] == [live["points"]] * 2
     assert built("--memory-mb", "1000") | {"seconds": 0} == live | {"seconds": 0}
-    full = built("--resolution-m", "0.1", "--memory-mb", "0.03")
+    full = built("--resolution-m", "0.02", "--memory-mb", "0.03")
     assert isinstance(full["left_out"], int)
     assert full["left_out"] > 0
     assert live["left_out"] == 0
@@ -117,10 +117,10 @@ def test_what_was_set_in_flight_gives_way_to_what_is_asked_for(tmp_path: Path) -
 
 def test_a_full_map_is_told(recording: Path, tmp_path: Path) -> None:
     arguments = ["map", str(recording), "--sensor", "radar", "--out", str(tmp_path / "a.ply")]
-    result = CliRunner().invoke(app, [*arguments, "--resolution-m", "0.1", "--memory-mb", "0.03"])
+    result = CliRunner().invoke(app, [*arguments, "--resolution-m", "0.02", "--memory-mb", "0.03"])
     assert result.exit_code == 0
     assert "reached its memory limit" in result.stderr
-    assert "voxels of 0.1 m" in result.stdout
+    assert "voxels of 0.02 m" in result.stdout
 
 
 @pytest.mark.parametrize(
