@@ -17,8 +17,8 @@ LEAST_BLOCKS = 16
 """Known whole."""
 LEAST_EXTENT_M = 1_000.0
 """Keys must reach at least so far from the origin."""
-BYTES_PER_VOXEL = 3.2
-"""Of a camera's map of 0.2 m; a block that is known whole takes 2.7."""
+BYTES_PER_VOXEL = 3.12
+"""Estimated for the whole ball; a block that is known whole takes 2.7."""
 SEEN_SHARE = 0.25
 """Of the ball around the sensor, at once."""
 
