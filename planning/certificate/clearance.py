@@ -21,6 +21,7 @@ from pyproj import Proj
 from mapping.geometry.arrays import F64
 from mapping.version import __version__
 from planning.basics.plan_model import FlownLine
+from planning.certificate.accuracy import with_accuracy
 from planning.certificate.as_json import certificate_json
 from planning.certificate.certificate_model import (
     Certificate,
@@ -78,6 +79,7 @@ def certify(
     a line with a point that is not finite.
     """
     _check(line, params, trend_step_m)
+    params = with_accuracy(params, dsm.rms_m)
     with threads_for(dsm.cells.elevation_m.size):
         certificate = _judged(dsm, dsm if ground is None else ground, line, params, trend_step_m)
     return replace(certificate, assumptions=certificate.assumptions | (assumptions or {}))

@@ -66,7 +66,11 @@ def home_ground(
         words, on_top = _obstacle(around, alt_m, *steep)
     else:
         words, on_top = _risen(around, reach_m, stands_dsm_m), False
-    return HomeGround(alt_m, float(reached.min()), float(reached.max()), reach_m, words, on_top)
+    low_m = float(reached.min())
+    if dsm.lowest_m is not None:
+        standing = cells_around(dsm.standing_cells, xy_m, reach_m)
+        low_m = min(low_m, float(np.nanmin(standing.height_m[standing.near_m <= reach_m])))
+    return HomeGround(alt_m, low_m, float(reached.max()), reach_m, words, on_top)
 
 
 def _unknown(alt_m: float, reach_m: float, words: str) -> HomeGround:

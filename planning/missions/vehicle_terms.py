@@ -6,9 +6,8 @@ from planning.basics.plan_model import VehicleProfile
 from planning.margins.budget import ClearanceBudget, Term
 from planning.margins.downwash import felt_below_m, induced_speed_m_s
 from planning.margins.following_error import Way, following_error_m, following_source
+from planning.terrain import BOUND_RMS
 
-BOUND_RMS = 3.0
-"""An accuracy is told as RMS of the check points; three times that bounds 99.7 % of normally distributed errors."""
 BY_HAND = "set by hand"
 
 

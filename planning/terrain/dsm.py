@@ -32,6 +32,8 @@ class SurfaceModel(ABC):
     vertical_datum: str | None
     sha256: str
     name: str
+    rms_m: float | None
+    """RMS error of its heights where it tells one itself: a clearance allows for no less. None: it tells none."""
 
     @property
     @abstractmethod
@@ -118,6 +120,9 @@ class Dsm(SurfaceModel):
     """The file's own cells where they are no squares of the grid; the grid is then nowhere lower than they are."""
     name: str = ""
     """Of its file; empty when nobody gave it one."""
+    lowest_m: F32 | None = None
+    """(H, W) how low a vehicle may stand on each cell; None: on its elevation."""
+    rms_m: float | None = None
 
     def __post_init__(self) -> None:
         t = self.transform
@@ -128,6 +133,8 @@ class Dsm(SurfaceModel):
         if not (t.a > 0 and np.isclose(t.a, -t.e, rtol=1e-6) and t.b == 0 and t.d == 0):
             raise ParameterError(f"A surface model's cells must be square and north up, got {tuple(t)[:6]}.")
         self.elevation_m.flags.writeable = False
+        if self.lowest_m is not None and self.lowest_m.shape != self.elevation_m.shape:
+            raise ParameterError(f"Lowest heights are {self.lowest_m.shape}, not {self.elevation_m.shape}.")
 
     @property
     def height_px(self) -> int:
@@ -144,6 +151,13 @@ class Dsm(SurfaceModel):
             return self.source
         return square_cells(self.elevation_m, self.resolution_m, (self.transform.c, self.transform.f))
 
+    @property
+    def standing_cells(self) -> Cells:
+        """How low a vehicle may stand on them."""
+        if self.lowest_m is None:
+            return self.cells
+        return square_cells(self.lowest_m, self.resolution_m, (self.transform.c, self.transform.f))
+
     def elevation_at(self, xy_m: F64) -> F64:
         if self.source is not None:
             return self.source.elevation_at(xy_m)
@@ -155,11 +169,11 @@ class Dsm(SurfaceModel):
 
     def with_elevation(self, elevation_m: F32) -> Dsm:
         """The same grid and provenance with other heights (same shape), which are nobody's measured cells."""
-        return replace(self, elevation_m=elevation_m, source=None)
+        return replace(self, elevation_m=elevation_m, source=None, lowest_m=None)
 
     def as_grid(self) -> Dsm:
         """The grid alone, for what is nowhere to be lower than the surface but need not be exact."""
-        return self if self.source is None else replace(self, source=None)
+        return self if self.source is None and self.lowest_m is None else replace(self, source=None, lowest_m=None)
 
     def with_cells(self, elevation_m: F32) -> Dsm:
         """The same model with other heights of its ``cells``; the grid follows them."""
@@ -181,7 +195,10 @@ class Dsm(SurfaceModel):
         if source is not None:
             low, high = transform @ (0, r1 - r0), transform @ (c1 - c0, 0)
             source = source.around(np.array(low), np.array(high))
-        return replace(self, elevation_m=self.elevation_m[r0:r1, c0:c1], transform=transform, source=source)
+        lowest_m = None if self.lowest_m is None else self.lowest_m[r0:r1, c0:c1]
+        return replace(
+            self, elevation_m=self.elevation_m[r0:r1, c0:c1], transform=transform, source=source, lowest_m=lowest_m
+        )
 
 
 def _inside(places: F64, count: int) -> tuple[int, int]:

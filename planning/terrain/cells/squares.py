@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from affine import Affine
 from numba import njit, prange
 
-from mapping.geometry.arrays import F32, F64
+from mapping.geometry.arrays import F32, F64, Bools
 from planning.terrain.cells.cells import Cells, Layout
 
 Inverse = Callable[[F64, F64], tuple[F64, F64]]
@@ -70,6 +71,32 @@ def squares_of_part(
         if progress:
             progress(there[0].stop / len(out))
     return out
+
+
+@dataclass(frozen=True, slots=True)
+class Touched:
+    """What each square of a grid touches of some cells."""
+
+    high_m: F32
+    """(rows, columns) the highest known cell; NaN where none is known."""
+    low_m: F32
+    """The lowest known one."""
+    whole: Bools
+    """Whether all that it touches is known, and no part of it lies outside."""
+
+
+def touched_cells(cells: Cells, transform: Affine, shape: tuple[int, int]) -> Touched:
+    """As ``squares``, but what is known counts also where a square touches unknown cells or reaches outside."""
+    rows, columns = shape
+    bounds = (transform.c, transform.f + rows * transform.e, transform.c + columns * transform.a, transform.f)
+    widest, highest = _reach(cells.layout, bounds)
+    margin = _margin(cells.layout) - 1e-6
+    half = (0.5 * transform.a * widest + margin, 0.5 * transform.a * highest + margin)
+    high_m, low_m = np.empty(shape, dtype=np.float32), np.empty(shape, dtype=np.float32)
+    whole = np.empty(shape, dtype=np.bool_)
+    for tile, column_f, row_f in source_places(_inverse(cells.layout), transform, shape):
+        _range_touched(cells.elevation_m, column_f, row_f, *half, high_m[tile], low_m[tile], whole[tile])
+    return Touched(high_m, low_m, whole)
 
 
 def _shared(tile: slice, part: slice) -> tuple[slice, slice]:
@@ -164,3 +191,34 @@ def _highest_touched(
                         if value == value and not source[r, c] <= value:
                             value = source[r, c]
             target[i, j] = value
+
+
+@njit(cache=True, nogil=True, parallel=True)
+def _range_touched(
+    source: F32,
+    column_f: F64,
+    row_f: F64,
+    half_columns: float,
+    half_rows: float,
+    high_m: F32,
+    low_m: F32,
+    whole: Bools,
+) -> None:
+    height, width = source.shape
+    for i in prange(high_m.shape[0]):
+        for j in range(high_m.shape[1]):
+            first_row, last_row = int(np.floor(row_f[i, j] - half_rows)), int(np.floor(row_f[i, j] + half_rows))
+            first_column = int(np.floor(column_f[i, j] - half_columns))
+            last_column = int(np.floor(column_f[i, j] + half_columns))
+            known = first_row >= 0 and last_row < height and first_column >= 0 and last_column < width
+            high, low = np.float32(-np.inf), np.float32(np.inf)
+            for r in range(max(first_row, 0), min(last_row + 1, height)):
+                for c in range(max(first_column, 0), min(last_column + 1, width)):
+                    value = source[r, c]
+                    if value == value:
+                        high, low = max(high, value), min(low, value)
+                    else:
+                        known = False
+            high_m[i, j] = high if high >= low else np.float32(np.nan)
+            low_m[i, j] = low if high >= low else np.float32(np.nan)
+            whole[i, j] = known

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,7 @@ class DsmFile(SurfaceModel):
 
     def __init__(self, source: Path | RemoteFile, declared: Declared, progress: Progress | None = None) -> None:
         self._source, self._declared, self._progress = source, declared, progress
-        self.name = source.name
+        self.name, self.rms_m = source.name, None
         self._kept: tuple[Pixels, np.ndarray] | None = None
         self._whole: Dsm | None = None
         self._first = read_surface(source, declared, _all_if_small, first=None, progress=progress)
@@ -84,6 +85,11 @@ class DsmFile(SurfaceModel):
         assert self._kept is not None
         kept, stored = self._kept
         return part_of(self._first.plan, stored, kept, (rows, columns), sha256=self.sha256, name=self.name)
+
+    def forget(self) -> None:
+        """Keeps no heights: what is asked for next is read from the file again."""
+        self._kept = self._whole = None
+        self._first = replace(self._first, stored=None)
 
     def elevation_at(self, xy_m: F64) -> F64:
         xy = np.asarray(xy_m, dtype=np.float64).reshape(-1, 2)
