@@ -1,0 +1,174 @@
+"""What a STAC document on disk says: which rasters, of when, with which errors, and which documents it names.
+
+Plain JSON is read, no library of STAC: pystac brings two dozen distributions along and opens whatever a document
+names. What a document names counts only as a path below the catalogue's folder; who reads it is asked elsewhere
+(``listing``).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Literal
+from urllib.parse import unquote
+
+import msgspec
+
+from planning.errors import RasterError, RasterFormatError
+
+MOST_BYTES = 4 * 2**20
+MOST_RMS_M = 20.0
+"""Vertical; a larger error is no surface model to fly on."""
+MOST_HORIZONTAL_M = 100.0
+_ROLES_LEFT_OUT = {"thumbnail", "overview", "visual", "metadata"}
+_SURFACE_KEYS = {"dsm", "surface", "elevation", "data"}
+_ENDINGS = (".tif", ".tiff")
+
+
+class _Properties(msgspec.Struct):
+    datetime: str | None = None
+    start_datetime: str | None = None
+    gsd: float | None = None
+    vertical_rms_m: float | None = msgspec.field(name="hedgehop:vertical_rms_m", default=None)
+    horizontal_rms_m: float | None = msgspec.field(name="hedgehop:horizontal_rms_m", default=None)
+    vertical_datum: str | None = msgspec.field(name="hedgehop:vertical_datum", default=None)
+
+
+class _Asset(msgspec.Struct):
+    href: str
+    roles: list[str] | None = None
+
+
+class _Link(msgspec.Struct):
+    rel: str
+    href: str
+
+
+class _Document(msgspec.Struct):
+    type: Literal["Feature", "Catalog", "Collection"]
+    stac_version: str
+    id: str
+    properties: _Properties | None = None
+    assets: dict[str, _Asset] | None = None
+    links: list[_Link] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What is told of a surface model beside its file; None: nothing."""
+
+    name: str = ""
+    taken_utc: datetime | None = None
+    gsd_m: float | None = None
+    """On the ground, where the raster's cells are finer than what was measured."""
+    vertical_rms_m: float | None = None
+    horizontal_rms_m: float | None = None
+    vertical_datum: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A STAC item, or a catalogue or collection that names some."""
+
+    told: Told
+    rasters: tuple[str, ...]
+    """Of an item: what its assets name, as it is written there; each may be the surface model."""
+    named: tuple[str, ...]
+    """Items and catalogues that it names, as they are written there."""
+    is_item: bool
+
+
+def read_document(path: Path) -> Document:
+    """RasterError for a file that is no STAC document, is too long, or tells what cannot be."""
+    where = path.name
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise RasterError(f"It is longer than {MOST_BYTES // 2**20} MiB.", where=where, advice="Split it.")
+        found = msgspec.json.decode(path.read_bytes(), type=_Document)
+    except OSError as error:
+        raise RasterError(f"It cannot be read: {error.strerror}.", where=where) from error
+    except (msgspec.MsgspecError, RecursionError, UnicodeError) as error:
+        raise RasterFormatError(
+            f"It is no STAC document ({error}).", where=where, advice="Write it again, or leave it out."
+        ) from error
+    is_item = found.type == "Feature"
+    named = [link.href for link in found.links or () if link.rel in ("item", "child") and not is_item]
+    rasters = _rasters(found.assets or {}) if is_item else ()
+    return Document(_told(found, where), rasters, tuple(named), is_item)
+
+
+def path_below(root: Path, document: Path, href: str) -> Path:
+    """The file that a document names. RasterError for what is no file of the catalogue's folder ``root``."""
+    name = unquote(href)
+    if "://" in href or "\0" in name or href.lower().startswith(("/vsi", "file:")):
+        raise RasterError(
+            f"{_short(href)} is no file of the catalogue's folder: nothing is read because a document says so.",
+            where=document.name,
+            advice="Put it into the folder, and name it from there.",
+        )
+    return file_below(root, document.parent / name, document.name, _short(href))
+
+
+def file_below(root: Path, file: Path, where: str, name: str) -> Path:
+    """The file itself, links followed. RasterError for one that lies outside of ``root``, or is none."""
+    try:
+        path = file.resolve()
+        inside = path.is_relative_to(root.resolve()) and path.is_file()
+    except (OSError, RuntimeError, ValueError):
+        path, inside = file, False
+    if not inside:
+        raise RasterError(
+            f"{name} is no file in the catalogue's folder.",
+            where=where,
+            advice="Put it there, or correct the name.",
+        )
+    return path
+
+
+def _rasters(assets: dict[str, _Asset]) -> tuple[str, ...]:
+    """Those that say by their key that they are the surface model, else all that may be."""
+    found = {
+        key: asset.href
+        for key, asset in assets.items()
+        if asset.href.lower().endswith(_ENDINGS) and not _ROLES_LEFT_OUT & set(asset.roles or ())
+    }
+    said = [href for key, href in found.items() if key.lower() in _SURFACE_KEYS]
+    return tuple(said if len(said) == 1 else found.values())
+
+
+def _told(found: _Document, where: str) -> Told:
+    said = found.properties or _Properties()
+    return Told(
+        name=_short("".join(letter for letter in found.id if letter.isprintable())),
+        taken_utc=_time(said.datetime or said.start_datetime, where),
+        gsd_m=_positive(said.gsd, "gsd", math.inf, where),
+        vertical_rms_m=_positive(said.vertical_rms_m, "hedgehop:vertical_rms_m", MOST_RMS_M, where),
+        horizontal_rms_m=_positive(said.horizontal_rms_m, "hedgehop:horizontal_rms_m", MOST_HORIZONTAL_M, where),
+        vertical_datum=said.vertical_datum or None,
+    )
+
+
+def _time(text: str | None, where: str) -> datetime | None:
+    """Without a zone it is taken as UTC."""
+    if text is None:
+        return None
+    try:
+        time = datetime.fromisoformat(text)
+        return (time if time.tzinfo else time.replace(tzinfo=UTC)).astimezone(UTC)
+    except (ValueError, OverflowError) as error:
+        raise RasterFormatError(
+            f"Its date {_short(text)!r} is none.", where=where, advice="Write it as 2026-05-01T10:00:00Z."
+        ) from error
+
+
+def _positive(value: float | None, name: str, most: float, where: str) -> float | None:
+    if value is None or (math.isfinite(value) and 0.0 < value <= most):
+        return value
+    limit = f" and at most {most:g}" if math.isfinite(most) else ""
+    raise RasterFormatError(f"Its {name} is {value:g}.", where=where, advice=f"Give metres above 0{limit}.")
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 80 else f"{text[:80]}..."
