@@ -17,6 +17,7 @@ from pyproj.crs import CompoundCRS
 from pyproj.exceptions import CRSError
 
 from planning.errors import ParameterError, RasterError
+from planning.terrain.catalogue.catalogue import Catalogue, open_catalogue
 from planning.terrain.dsm import Dsm
 from planning.terrain.orthophoto import Orthophoto, OrthophotoPlan, drape, plan_orthophoto
 from planning.terrain.rasters import georef, sandbox
@@ -72,6 +73,11 @@ def read_dsm_reported(
 def open_dsm(path: str | os.PathLike[str] | RemoteFile, **how: Unpack[ReadOptions]) -> DsmFile:
     """The surface model of ``read_dsm``, of a large file only the parts that are asked for; isolated spikes stay."""
     return DsmFile(path if isinstance(path, RemoteFile) else Path(path), _declared(how), how.get("progress"))
+
+
+def open_models_of(path: str | os.PathLike[str], **how: Unpack[ReadOptions]) -> Catalogue:
+    """Several surface models as one (``planning.terrain.catalogue``): a folder of GeoTIFFs, or a STAC document."""
+    return open_catalogue(Path(path), _declared(how), how.get("progress"))
 
 
 def read_orthophoto(

@@ -1,0 +1,141 @@
+"""The surface models of a catalogue: opened, judged and put in order, the best first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+
+from planning.errors import RasterError
+from planning.terrain import BOUND_RMS
+from planning.terrain.catalogue.listing import LeftOut, Listed, Listing
+from planning.terrain.dsm import SurfaceModel
+from planning.terrain.projects import is_terrain
+from planning.terrain.rasters.dsm_file import DsmFile
+from planning.terrain.rasters.reading import Declared, Progress
+from planning.terrain.vertical_datum import datums_differ
+
+GOOD_RMS_M = 0.5
+"""Of models at least so exact the newest is the best; of others the most exact."""
+_CLOCKS_OFF = timedelta(days=1)
+
+
+@dataclass(frozen=True, slots=True)
+class CatalogueModel:
+    """One surface model of a catalogue."""
+
+    file: DsmFile
+    name: str
+    taken_utc: datetime | None
+    resolution_m: float
+    """Of its cells, or of what was measured where that is coarser."""
+    rms_m: float
+    """Vertical. Where nobody told it: one cell, or the largest that is told of another model."""
+    rms_told: bool
+    horizontal_m: float
+    """Bound of the horizontal error; where nobody told it one cell."""
+
+    @property
+    def bound_m(self) -> float:
+        """Of the vertical error."""
+        return BOUND_RMS * self.rms_m
+
+    @property
+    def words(self) -> str:
+        """E.g. "flight-7: 2026-05-01, 0.1 m, ±0.2 m"."""
+        date = "date unknown" if self.taken_utc is None else f"{self.taken_utc:%Y-%m-%d}"
+        error = f"±{self.bound_m:.2g} m" if self.rms_told else f"error unknown, taken as ±{self.bound_m:.2g} m"
+        return f"{self.name}: {date}, {self.resolution_m:.3g} m, {error}"
+
+    @property
+    def order(self) -> tuple[float, ...]:
+        """Smaller is better."""
+        age = 0.0 if self.taken_utc is None else -self.taken_utc.timestamp()
+        dated = (float(self.taken_utc is None), age)
+        if self.rms_m <= GOOD_RMS_M:
+            return (0.0, *dated, self.rms_m, self.resolution_m)
+        return (1.0, self.rms_m, *dated, self.resolution_m)
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """What of a listing can be used together, the best first."""
+
+    models: tuple[CatalogueModel, ...]
+    left_out: tuple[LeftOut, ...]
+    notes: tuple[str, ...]
+
+
+def open_models(listing: Listing, declared: Declared, progress: Progress | None) -> Opened:
+    """Opens each for its header and its SHA-256. RasterError where none can be used."""
+    left_out, notes = list(listing.left_out), list[str]()
+    found: list[CatalogueModel] = []
+    for listed in listing.models:
+        try:
+            found.append(_opened(listed, declared, progress, notes))
+        except RasterError as error:
+            left_out.append(LeftOut(listed.path.name, " ".join(part for part in (error.what, error.advice) if part)))
+    ranked = sorted(_with_errors(found), key=lambda model: (model.order, model.name, model.file.sha256))
+    fitting = _fitting(ranked, left_out)
+    if not fitting:
+        first = next(iter(left_out), None)
+        why = "" if first is None else f" {first.name}: {first.why}"
+        raise RasterError(f"The catalogue has no surface model that can be used.{why}", advice="Look at each of them.")
+    return Opened(tuple(fitting), tuple(left_out), tuple(notes))
+
+
+def _opened(listed: Listed, declared: Declared, progress: Progress | None, notes: list[str]) -> CatalogueModel:
+    told, path = listed.told, listed.path
+    if is_terrain(path.name):
+        raise RasterError(
+            "It is a terrain model (DTM) by its name: trees and buildings are missing in it.",
+            where=path.name,
+            advice="Use the surface model (DSM).",
+        )
+    said = replace(declared, vertical_datum=declared.vertical_datum or told.vertical_datum, virtual=False)
+    file = DsmFile(path, said, progress)
+    name = told.name or path.stem
+    notes += [f"{name}: {note}" for note in file.warnings]
+    file.forget()
+    taken_utc = told.taken_utc
+    if taken_utc is not None and taken_utc > datetime.now(UTC) + _CLOCKS_OFF:
+        notes.append(f"{name}: its date, {taken_utc:%Y-%m-%d}, lies in the future and counts as unknown.")
+        taken_utc = None
+    resolution_m = max(file.resolution_m, told.gsd_m or 0.0)
+    horizontal_m = BOUND_RMS * told.horizontal_rms_m if told.horizontal_rms_m else resolution_m
+    rms_m = told.vertical_rms_m or resolution_m
+    return CatalogueModel(file, name, taken_utc, resolution_m, rms_m, bool(told.vertical_rms_m), horizontal_m)
+
+
+def _with_errors(models: Sequence[CatalogueModel]) -> list[CatalogueModel]:
+    """What nobody told is no better than the worst that was told."""
+    worst_m = max((model.rms_m for model in models if model.rms_told), default=0.0)
+    return [model if model.rms_told else replace(model, rms_m=max(model.rms_m, worst_m)) for model in models]
+
+
+def _fitting(ranked: Sequence[CatalogueModel], left_out: list[LeftOut]) -> list[CatalogueModel]:
+    """Those in the reference system and vertical datum of the best."""
+    fitting: list[CatalogueModel] = []
+    for model in ranked:
+        why = _misfit(ranked[0].file, ranked[0].name, model.file)
+        if why:
+            left_out.append(LeftOut(model.name, why))
+        else:
+            fitting.append(model)
+    return fitting
+
+
+def _misfit(best: SurfaceModel, best_name: str, other: SurfaceModel) -> str:
+    """Why a model cannot be used beside the best one; empty: it can."""
+    if not best.crs.equals(other.crs, ignore_axis_order=True):
+        return (
+            f"It is in {other.crs.name}, {best_name} in {best.crs.name}. Bring it there, heights never lowered: "
+            "gdalwarp -r max -t_srs CRS."
+        )
+    one, two = best.vertical_datum, other.vertical_datum
+    if datums_differ(one, two) or (one is None) != (two is None):
+        return (
+            f"Its vertical datum is {two or 'not told'}, that of {best_name} {one or 'not told'}: heights may lie tens "
+            "of metres apart. Bring both to one datum, or declare it for all."
+        )
+    return ""
