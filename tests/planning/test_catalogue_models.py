@@ -1,0 +1,114 @@
+"""The models of a catalogue: which of them is better, which do not fit, and what is planned over a seam."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from affine import Affine
+
+from planning.basics.plan_model import PathParams, Poi, SurfaceParams, VehicleProfile
+from planning.certificate.clearance import certify
+from planning.errors import RasterError
+from planning.planner.plan import plan_mission
+from planning.planner.request import PlanRequest
+from planning.terrain.catalogue.best import seam_m
+from planning.terrain.catalogue.catalogue import Catalogue
+from planning.terrain.catalogue.models import Opened
+from planning.terrain.dsm import Dsm
+from planning.terrain.geotiff import open_models_of
+from planning.terrain.rasters.header import RasterLimits
+from tests.planning.catalogue_samples import NORTH_M, WEST_M, in_memory, item
+from tests.planning.geotiff_samples import write_raster
+
+FLAT = np.full((8, 8), 3.0, np.float32)
+
+
+def test_the_newest_of_good_ones_is_the_best_and_the_most_exact_of_others() -> None:
+    ranked = [
+        in_memory(FLAT, name="newest good", rms_m=0.5, year=2026),
+        in_memory(FLAT, name="older good", rms_m=0.02, year=2020),
+        in_memory(FLAT, name="good of no date", rms_m=0.02, year=None),
+        in_memory(FLAT, name="newer bad", rms_m=0.6, year=2027),
+        in_memory(FLAT, name="newest bad", rms_m=3.0, year=2028),
+    ]
+    assert sorted(ranked[2:] + ranked[:2], key=lambda model: model.order) == ranked
+
+
+def test_files_are_opened_judged_and_told(tmp_path: Path) -> None:
+    write_raster(tmp_path / "new.tif", FLAT)
+    item(tmp_path, "new.tif", name="new", datetime="2026-05-01T10:00:00Z", hedgehop__vertical_rms_m=0.1)
+    write_raster(tmp_path / "old.tif", FLAT + 1, transform=Affine(1.0, 0.0, WEST_M, 0.0, -1.0, NORTH_M))
+    write_raster(tmp_path / "late.tif", FLAT)
+    item(tmp_path, "late.tif", datetime="2999-01-01T00:00:00Z", hedgehop__vertical_rms_m=0.6)
+    write_raster(tmp_path / "elsewhere.tif", FLAT, crs="EPSG:32634")
+    write_raster(tmp_path / "other_datum.tif", FLAT, tags={"HEDGEHOP_VERTICAL_DATUM": "ellipsoid"})
+    write_raster(tmp_path / "site_dtm.tif", FLAT)
+    (tmp_path / "broken.tif").write_bytes(b"II*\0 and no more")
+    found = open_models_of(tmp_path)
+    assert [model.name for model in found.models] == ["new", "late", "old"]
+    # What nobody told: one cell, and no better than the worst that was told.
+    assert [(model.rms_m, model.rms_told) for model in found.models] == [(0.1, True), (0.6, True), (1.0, False)]
+    why = {out.name: out.why for out in found.left_out}
+    assert set(why) == {"elsewhere", "other_datum", "site_dtm.tif", "broken.tif"}
+    assert "32634" in why["elsewhere"] or "zone 34N" in why["elsewhere"]
+    assert "ellipsoid" in why["other_datum"]
+    assert "terrain model" in why["site_dtm.tif"]
+    assert any("lies in the future" in note for note in found.warnings)
+    assert (found.resolution_m, found.height_px, found.width_px) == (0.5, 16, 16)
+    west_m = found.elevation_at(np.array([[WEST_M + 1.0, NORTH_M - 1.0], [WEST_M + 7.0, NORTH_M - 1.0]]))
+    # Over "new" the older ones count too, so near its edge; all are raised by what their error is more.
+    np.testing.assert_allclose(west_m, 4.0 + 3 * (1.0 - 0.1), atol=1e-5)
+    assert found.rms_m == 0.1
+    write_raster(tmp_path / "new.tif", FLAT + 2)
+    with pytest.raises(RasterError, match="changed"):
+        Catalogue(Opened(found.models, (), ()), "again", RasterLimits()).window(0, 0, 16, 16)
+
+
+def test_a_catalogue_of_nothing_that_can_be_used_says_why(tmp_path: Path) -> None:
+    (tmp_path / "broken.tif").write_bytes(b"II*\0 and no more")
+    with pytest.raises(RasterError, match=r"no surface model that can be used\. broken\.tif: "):
+        open_models_of(tmp_path)
+
+
+def poi(model: Catalogue, east_m: float, south_m: float) -> Poi:
+    lat_deg, lon_deg = model.lat_lon_from_xy(np.array([[WEST_M + east_m, NORTH_M - south_m]]))[0]
+    return Poi(float(lat_deg), float(lon_deg))
+
+
+def test_a_plan_over_a_seam_is_certified_against_the_worse_of_both() -> None:
+    new, old = np.zeros((80, 80), np.float32), np.zeros((80, 160), np.float32)
+    old[38:42, 88:90] = 9.0  # beyond the new model's edge
+    old[38:42, 70:72] = 12.0  # 8 m inside of it, where the new one says nothing stands
+    old[38:42, 30:32] = 15.0  # far inside: it was taken down since
+    newest = in_memory(new, cell_m=1.0, rms_m=0.05, horizontal_m=0.5, year=2026, name="new")
+    older = in_memory(old, cell_m=1.0, rms_m=0.15, horizontal_m=0.5, year=2015, name="old")
+    catalogue = Catalogue(Opened((newest, older), (), ()), "both", RasterLimits())
+    request = PlanRequest(
+        pois=(poi(catalogue, 20.5, 40.5), poi(catalogue, 140.5, 40.5)),
+        profile=VehicleProfile("quad", rtl_height_m=60.0, position_error_m=0.5),
+        surface=SurfaceParams(8.0, 8.0),
+        path=PathParams(step_m=0.5),
+    )
+    plan = plan_mission(catalogue, request)
+    # By hand: new raised by nothing, old by 3 x (0.15 - 0.05) m; both within the reach of the seam.
+    reach_px = int(seam_m(newest, older))
+    by_hand = old + np.float32(0.3)
+    by_hand[:, : 80 - reach_px] = 0.0
+    by_hand[:, 80 - reach_px : 80] = np.maximum(by_hand[:, 80 - reach_px : 80], 0.0)
+    slow = Dsm(by_hand, catalogue.transform, catalogue.crs, None, "")
+    expected = certify(slow, plan.line, request.clearance())
+    assert plan.certificate.min_distance_m <= expected.min_distance_m + 1e-4
+    assert float(plan.dsm.elevation_m[40, 70]) == pytest.approx(12.3, abs=1e-5)
+    assert float(plan.dsm.elevation_m[40, 30]) == 0.0
+    assert plan.certificate.home is not None
+    # Home stands on the new model: as low as its error has it.
+    assert plan.certificate.home.drop_m == pytest.approx(0.15, abs=1e-5)
+    # The clearance allows for what the better model tells of itself.
+    assert plan.certificate.required_clearance_m == pytest.approx(
+        request.clearance().required_clearance_m + 3 * (0.05 - 0.023), abs=1e-6
+    )
+    shares, seam = catalogue.shares_of(plan.ground)
+    assert [(share.model.name, share.share) for share in shares] == [("new", 0.5), ("old", 0.5)]
+    assert 0.1 < seam < 0.3
