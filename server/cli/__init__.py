@@ -73,7 +73,7 @@ class _Commands(_Lazy):
         "sim": (".sim_command.sim", examples.SIM),
         "review": (".review_command.review", examples.REVIEW),
         "scenario": (".scenario_command.scenario", examples.SCENARIO),
-        "cloud": (".cloud_command.cloud", examples.CLOUD),
+        "cloud": (".terrain.cloud_command.cloud", examples.CLOUD),
         "map": (".maps.map_command.build_map", examples.MAP),
         "bag": (".maps.bag_command.bag", examples.BAG),
         "export": (".maps.export_command.export", examples.EXPORT),
@@ -87,6 +87,7 @@ class _Commands(_Lazy):
         "ros2": ("", ""),
         "account": ("", ""),
         "library": ("", ""),
+        "terrain": ("", ""),
     }
 
 
@@ -131,6 +132,12 @@ class _LibraryCommands(_Lazy):
     }
 
 
+class _TerrainCommands(_Lazy):
+    places: ClassVar = {
+        "catalogue": (".terrain.catalogue_command.catalogue", examples.TERRAIN_CATALOGUE),
+    }
+
+
 class _AccountCommands(_Lazy):
     places: ClassVar = {
         "add": (".door.account_command.add", examples.ACCOUNT_ADD),
@@ -167,7 +174,18 @@ library = typer.Typer(
     rich_markup_mode="rich",
     cls=_LibraryCommands,
 )
-_GROUPS = {"radar": radar, "ros2": ros2, "account": account, "params": params, "logs": logs, "library": library}
+terrain = typer.Typer(
+    name="terrain", help="Surface models.", no_args_is_help=True, rich_markup_mode="rich", cls=_TerrainCommands
+)
+_GROUPS = {
+    "radar": radar,
+    "ros2": ros2,
+    "account": account,
+    "params": params,
+    "logs": logs,
+    "library": library,
+    "terrain": terrain,
+}
 app = typer.Typer(
     name="hedgehop",
     help="Plan drone flights that hug the terrain, prove their clearance, fly and review them.",

@@ -73,7 +73,7 @@ def certify(
         max_hole_m2=model.max_hole_m2,
         assumptions={**opened.made, "vehicle_profile": vehicle.name},
     )
-    opened.say_spikes(ground.dsm)
+    opened.say_part(ground.dsm)
     feasibility = _feasibility(flight, vehicle, ground.filled, is_named=given.profile is not None)
     whole = certificate_json(certificate) if verbose else {}
     summary = {

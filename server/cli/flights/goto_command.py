@@ -307,7 +307,7 @@ class _Flier:
     def _part(self, state: VehicleState, flown: Flown) -> Dsm:
         part = part_for(self._model.model, state, self._wish, flown.rally)
         end_progress()
-        self._model.say_spikes(part)
+        self._model.say_part(part)
         return part
 
     async def _followed(self, station: Station, watch: Watch, asked_utc_s: float) -> FlightStatus:

@@ -116,6 +116,10 @@ LIBRARY_PULL = _examples(
     ("Into another data directory, for a script", "hedgehop library pull s3://survey/hedgehop --data-dir all --json"),
 )
 LIBRARY_LIST = _examples(("What a stick holds", "hedgehop library list /media/crew/stick"))
+TERRAIN_CATALOGUE = _examples(
+    ("Which models can be used, and which of them first", "hedgehop terrain catalogue maps/"),
+    ("Which one counts at a place", "hedgehop terrain catalogue maps/collection.json --at 37.7300,14.9900"),
+)
 PARAMS_COMPARE = _examples(
     ("With a file", "hedgehop params compare before.param --link udpin:0.0.0.0:14550"),
     ("With another vehicle", "hedgehop params compare tcp:10.0.0.8:5760 --link tcp:10.0.0.7:5760"),

@@ -20,7 +20,7 @@ _SHIPPED = f"A shipped profile ({', '.join(shipped_profiles())}) or a TOML file"
 _FLOWN_AS = "Mission on board, or waypoints handed over one at a time"
 
 DsmFile = Annotated[
-    Path, Argument(metavar="DSM", help="Surface model: GeoTIFF, ESRI ASCII grid, folder of tiles or VRT.")
+    Path, Argument(metavar="DSM", help="Surface model: GeoTIFF, ESRI ASCII grid, folder of tiles, VRT or catalogue.")
 ]
 FlightDsm = Annotated[
     Path | None,
@@ -61,6 +61,14 @@ class ModelOptions:
     vertical_datum: Annotated[
         str | None, Option(help='Datum of the heights: "EGM2008 height", "ellipsoid". AMSL altitudes need one.')
     ] = None
+    catalogue: Annotated[
+        bool,
+        Option(
+            "--catalogue",
+            help="The folder holds several models, not the tiles of one: of each place the best counts. "
+            "A STAC document (.json) always is one.",
+        ),
+    ] = False
     max_hole_m2: Annotated[
         float,
         Option(

@@ -79,7 +79,7 @@ def run(
     source = opened.model
     plan = plan_mission(source, request_for(source), report=timer, assumptions=opened.made)
     seconds = timer.seconds()
-    opened.say_spikes(plan.ground)
+    opened.say_part(plan.ground)
     progress("Writing the files", None)
     created_utc = utc_now()
     files = {

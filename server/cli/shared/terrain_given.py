@@ -10,10 +10,11 @@ from typing import Any
 from mapping.geometry.arrays import F64
 from planning.errors import ParameterError
 from planning.planner.part import FLIGHT_MARGIN_M, needed_part
+from planning.terrain.catalogue.catalogue import Catalogue
 from planning.terrain.dsm import Dsm, SurfaceModel
-from planning.terrain.geotiff import open_dsm, read_dsm_reported
+from planning.terrain.geotiff import open_dsm, open_models_of, read_dsm_reported
 from planning.terrain.rasters.http_ranges import RemoteFile, is_address
-from planning.terrain.spikes import Spike, find_spikes
+from planning.terrain.spikes import Spike, find_spikes, remove_spikes
 from server.cli.shared.options import ModelOptions
 from server.cli.shared.output import end_progress, say_notes
 from server.settings import load_settings
@@ -29,8 +30,10 @@ class OpenedModel:
     """What was done to its heights, and what its SHA-256 is of, for the certificate's assumptions."""
     spikes_told: bool
 
-    def say_spikes(self, part: Dsm) -> None:
-        """Those of the part that was looked at, once it is known."""
+    def say_part(self, part: Dsm) -> None:
+        """Spikes of the part that was looked at, once it is known, and the models of a catalogue that it is of."""
+        if isinstance(self.model, Catalogue):
+            say_notes(*share_lines(self.model, part))
         if not self.spikes_told:
             _say_spikes(find_spikes(part), removed=False)
 
@@ -41,6 +44,11 @@ def open_model(path: Path, timer: StepTimer, options: ModelOptions) -> OpenedMod
         dsm, made = read_model(path, timer, options)
         return OpenedModel(dsm, made, spikes_told=True)
     timer(READ_STEP, 0.0)
+    if is_catalogue(path, options):
+        catalogue = open_models_of(path, **_how(options, timer))
+        end_progress()
+        say_notes(*catalogue.warnings)
+        return OpenedModel(catalogue, _made_of(catalogue), spikes_told=False)
     source = RemoteFile(str(path), load_settings().dsm_urls) if is_address(path) else path
     model = open_dsm(source, **_how(options, timer))
     end_progress()
@@ -56,7 +64,7 @@ def read_around(path: Path, timer: StepTimer, options: ModelOptions, places: Cal
     opened = open_model(path, timer, options)
     part = needed_part(opened.model, places(opened.model), FLIGHT_MARGIN_M)
     end_progress()
-    opened.say_spikes(part)
+    opened.say_part(part)
     return part
 
 
@@ -69,11 +77,44 @@ def read_model(path: Path, timer: StepTimer, options: ModelOptions) -> tuple[Dsm
             advice="Download the file, or do without it (--remove-spikes, traversability).",
         )
     timer(READ_STEP, 0.0)
+    if is_catalogue(path, options):
+        return _read_catalogue(path, timer, options)
     dsm, report = read_dsm_reported(path, remove_spikes=options.remove_spikes, **_how(options, timer))
     end_progress()
     say_notes(*report.warnings)
     _say_spikes(report.spikes, removed=report.spikes_removed)
     return dsm, {"spikes_removed": len(report.spikes)} if report.spikes_removed else {}
+
+
+def is_catalogue(path: Path, options: ModelOptions) -> bool:
+    """Whether several models are given: a STAC document, or what is said to be a catalogue."""
+    return not is_address(path) and (options.catalogue or path.suffix.lower() == ".json")
+
+
+def share_lines(catalogue: Catalogue, part: Dsm) -> list[str]:
+    """Which models of a catalogue are the best in a part of it, in words."""
+    shares, seam = catalogue.shares_of(part)
+    lines = [f"here: {share.model.words}: the best of {share.share:.0%} of the part looked at." for share in shares]
+    return [*lines, f"{seam:.0%} of it lies at seams: the higher of the models counts."] if seam else lines
+
+
+def _read_catalogue(path: Path, timer: StepTimer, options: ModelOptions) -> tuple[Dsm, dict[str, object]]:
+    catalogue = open_models_of(path, **_how(options, timer))
+    dsm = catalogue.whole()
+    end_progress()
+    say_notes(*catalogue.warnings, *share_lines(catalogue, dsm))
+    spikes, removed = find_spikes(dsm), options.remove_spikes
+    _say_spikes(spikes, removed=removed)
+    made = _made_of(catalogue) | ({"spikes_removed": len(spikes)} if removed else {})
+    return remove_spikes(dsm, spikes) if removed else dsm, made
+
+
+def _made_of(catalogue: Catalogue) -> dict[str, object]:
+    """For the certificate's assumptions."""
+    return {
+        "models": "; ".join(model.words for model in catalogue.models),
+        "models_left_out": "; ".join(out.name for out in catalogue.left_out) or "none",
+    }
 
 
 def _how(options: ModelOptions, timer: StepTimer) -> dict[str, Any]:
