@@ -351,5 +351,7 @@ def test_flipped_bits_never_come_through_as_another_error(tmp_path: Path) -> Non
 
 
 def test_only_the_child_loads_what_decodes() -> None:
-    code = "import sys, server.cli.terrain.cloud_command; sys.exit(bool({'laspy', 'lazrs', 'pye57'} & set(sys.modules)))"
+    code = (
+        "import sys, server.cli.terrain.cloud_command; sys.exit(bool({'laspy', 'lazrs', 'pye57'} & set(sys.modules)))"
+    )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -64,7 +64,7 @@ class Catalogue(SurfaceModel):
         self.left_out: tuple[LeftOut, ...] = opened.left_out
         self.name, self._limits, self._progress = name, limits, progress
         best = opened.models[0]
-        self.crs, self.vertical_datum = best.file.crs, best.file.vertical_datum
+        self.crs, self.vertical_datum = best.file.crs, best.vertical_datum
         self.transform, self._shape = _grid_over(opened.models)
         self.rms_m = min((model.rms_m for model in opened.models if model.rms_told), default=None)
         self.sha256 = _digest(self.layers, self.transform)

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
-from planning.errors import RasterError
+from planning.errors import MissingCrsError, ParameterError, RasterError
 from planning.terrain import BOUND_RMS
 from planning.terrain.catalogue.listing import LeftOut, Listed, Listing
-from planning.terrain.dsm import SurfaceModel
 from planning.terrain.projects import is_terrain
 from planning.terrain.rasters.dsm_file import DsmFile
 from planning.terrain.rasters.reading import Declared, Progress
@@ -34,6 +34,8 @@ class CatalogueModel:
     rms_told: bool
     horizontal_m: float
     """Bound of the horizontal error; where nobody told it one cell."""
+    vertical_datum: str | None = None
+    """The file's, else its item's, else the one that was declared for those that say none."""
 
     @property
     def bound_m(self) -> float:
@@ -67,7 +69,17 @@ class Opened:
 
 
 def open_models(listing: Listing, declared: Declared, progress: Progress | None) -> Opened:
-    """Opens each for its header and its SHA-256. RasterError where none can be used."""
+    """Opens each for its header and its SHA-256. RasterError where none can be used.
+
+    A reference system and a datum that are declared are those of models that say none: others keep their own.
+    ParameterError for a height scale, which would change all of them.
+    """
+    if declared.z_scale is not None:
+        raise ParameterError(
+            "A height scale is not given for several models at once.",
+            where="--z-scale",
+            advice="Write it into the file it is meant for: gdal_edit.py -scale 0.01 FILE",
+        )
     left_out, notes = list(listing.left_out), list[str]()
     found: list[CatalogueModel] = []
     for listed in listing.models:
@@ -86,14 +98,20 @@ def open_models(listing: Listing, declared: Declared, progress: Progress | None)
 
 def _opened(listed: Listed, declared: Declared, progress: Progress | None, notes: list[str]) -> CatalogueModel:
     told, path = listed.told, listed.path
-    if is_terrain(path.name):
+    if is_terrain(f"{path.parent.name}/{path.name}") or is_terrain(told.name):
         raise RasterError(
             "It is a terrain model (DTM) by its name: trees and buildings are missing in it.",
             where=path.name,
             advice="Use the surface model (DSM).",
         )
-    said = replace(declared, vertical_datum=declared.vertical_datum or told.vertical_datum, virtual=False)
-    file = DsmFile(path, said, progress)
+    file = _file(path, replace(declared, vertical_datum=None, virtual=False), progress)
+    if datums_differ(told.vertical_datum, file.vertical_datum):
+        raise RasterError(
+            f"Its item says the vertical datum {told.vertical_datum}, the file {file.vertical_datum}.",
+            where=path.name,
+            advice="Correct the one that is wrong.",
+        )
+    datum = file.vertical_datum or told.vertical_datum or declared.vertical_datum
     name = told.name or path.stem
     notes += [f"{name}: {note}" for note in file.warnings]
     file.forget()
@@ -104,7 +122,16 @@ def _opened(listed: Listed, declared: Declared, progress: Progress | None, notes
     resolution_m = max(file.resolution_m, told.gsd_m or 0.0)
     horizontal_m = BOUND_RMS * told.horizontal_rms_m if told.horizontal_rms_m else resolution_m
     rms_m = told.vertical_rms_m or resolution_m
-    return CatalogueModel(file, name, taken_utc, resolution_m, rms_m, bool(told.vertical_rms_m), horizontal_m)
+    return CatalogueModel(file, name, taken_utc, resolution_m, rms_m, bool(told.vertical_rms_m), horizontal_m, datum)
+
+
+def _file(path: Path, declared: Declared, progress: Progress | None) -> DsmFile:
+    try:
+        return DsmFile(path, replace(declared, crs=None), progress)
+    except MissingCrsError:
+        if declared.crs is None:
+            raise
+        return DsmFile(path, declared, progress)
 
 
 def _with_errors(models: Sequence[CatalogueModel]) -> list[CatalogueModel]:
@@ -117,7 +144,7 @@ def _fitting(ranked: Sequence[CatalogueModel], left_out: list[LeftOut]) -> list[
     """Those in the reference system and vertical datum of the best."""
     fitting: list[CatalogueModel] = []
     for model in ranked:
-        why = _misfit(ranked[0].file, ranked[0].name, model.file)
+        why = _misfit(ranked[0], model)
         if why:
             left_out.append(LeftOut(model.name, why))
         else:
@@ -125,17 +152,17 @@ def _fitting(ranked: Sequence[CatalogueModel], left_out: list[LeftOut]) -> list[
     return fitting
 
 
-def _misfit(best: SurfaceModel, best_name: str, other: SurfaceModel) -> str:
+def _misfit(best: CatalogueModel, other: CatalogueModel) -> str:
     """Why a model cannot be used beside the best one; empty: it can."""
-    if not best.crs.equals(other.crs, ignore_axis_order=True):
+    if not best.file.crs.equals(other.file.crs, ignore_axis_order=True):
         return (
-            f"It is in {other.crs.name}, {best_name} in {best.crs.name}. Bring it there, heights never lowered: "
-            "gdalwarp -r max -t_srs CRS."
+            f"It is in {other.file.crs.name}, {best.name} in {best.file.crs.name}. "
+            "Bring it there, heights never lowered: gdalwarp -r max -t_srs CRS."
         )
     one, two = best.vertical_datum, other.vertical_datum
     if datums_differ(one, two) or (one is None) != (two is None):
         return (
-            f"Its vertical datum is {two or 'not told'}, that of {best_name} {one or 'not told'}: heights may lie tens "
+            f"Its vertical datum is {two or 'not told'}, that of {best.name} {one or 'not told'}: heights may lie tens "
             "of metres apart. Bring both to one datum, or declare it for all."
         )
     return ""
