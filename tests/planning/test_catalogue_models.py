@@ -10,7 +10,7 @@ from affine import Affine
 
 from planning.basics.plan_model import PathParams, Poi, SurfaceParams, VehicleProfile
 from planning.certificate.clearance import certify
-from planning.errors import RasterError
+from planning.errors import ParameterError, RasterError
 from planning.planner.plan import plan_mission
 from planning.planner.request import PlanRequest
 from planning.terrain.catalogue.best import seam_m
@@ -70,6 +70,36 @@ def test_a_catalogue_of_nothing_that_can_be_used_says_why(tmp_path: Path) -> Non
     (tmp_path / "broken.tif").write_bytes(b"II*\0 and no more")
     with pytest.raises(RasterError, match=r"no surface model that can be used\. broken\.tif: "):
         open_models_of(tmp_path)
+
+
+def test_what_is_declared_is_of_those_that_say_nothing(tmp_path: Path) -> None:
+    write_raster(tmp_path / "bare.tif", FLAT, crs=None)
+    write_raster(tmp_path / "own.tif", FLAT, tags={"HEDGEHOP_VERTICAL_DATUM": "ellipsoid"})
+    write_raster(tmp_path / "contrary.tif", FLAT, tags={"HEDGEHOP_VERTICAL_DATUM": "ellipsoid"})
+    item(tmp_path, "contrary.tif", hedgehop__vertical_datum="EGM96 height")
+    item(tmp_path, "bare.tif", datetime="2026-05-01T10:00:00Z")
+    found = open_models_of(tmp_path, crs="EPSG:32633", vertical_datum="EGM96 height")
+    assert [(model.name, model.vertical_datum) for model in found.models] == [("bare", "EGM96 height")]
+    assert {out.name for out in found.left_out} == {"own", "contrary.tif"}
+    with pytest.raises(ParameterError, match="height scale"):
+        open_models_of(tmp_path, z_scale=0.01)
+
+
+def test_cells_in_degrees_count_where_they_lie(tmp_path: Path) -> None:
+    """Bent and oblong in metres: every one of them stands under the surface where it is the only model."""
+    random = np.random.default_rng(5)
+    write_raster(tmp_path / "near.tif", random.uniform(0, 9, (8, 8)).astype(np.float32))
+    rough = random.uniform(20, 40, (12, 12)).astype(np.float32)
+    west, north = 15.0, 37.6775
+    write_raster(tmp_path / "far.tif", rough, crs="EPSG:4326", transform=Affine(3e-5, 0.0, west, 0.0, -2e-5, north))
+    found = open_models_of(tmp_path)
+    assert {model.name for model in found.models} == {"near", "far"}, found.warnings
+    raised_m = next(layer.raise_m for layer in found.layers if layer.model.name == "far")
+    columns, rows = np.meshgrid(np.arange(1, 11), np.arange(1, 11))
+    for shift in (0.02, 0.5, 0.98):
+        places = np.column_stack([north - 2e-5 * (rows.ravel() + shift), west + 3e-5 * (columns.ravel() + shift)])
+        heights = found.elevation_at(found.xy_from_lat_lon(places))
+        assert (heights >= rough[1:11, 1:11].ravel() + raised_m - 1e-3).all()
 
 
 def poi(model: Catalogue, east_m: float, south_m: float) -> Poi:
