@@ -17,7 +17,7 @@ from pyproj.crs import CompoundCRS
 from pyproj.exceptions import CRSError
 
 from planning.errors import ParameterError, RasterError
-from planning.terrain.catalogue.catalogue import Catalogue, open_catalogue
+from planning.terrain.catalogue.joined_models import Catalogue, open_catalogue
 from planning.terrain.dsm import Dsm
 from planning.terrain.orthophoto import Orthophoto, OrthophotoPlan, drape, plan_orthophoto
 from planning.terrain.rasters import georef, sandbox

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from planning.errors import RasterError, RasterFormatError, RasterTooLargeError
-from planning.terrain.catalogue.listing import MOST_MODELS, Listing, listing_of
+from planning.terrain.catalogue.listed_models import MOST_MODELS, Listing, listing_of
 from planning.terrain.catalogue.stac import MOST_BYTES
 from tests.planning.catalogue_samples import item
 

@@ -14,7 +14,7 @@ from planning.errors import ParameterError, RasterError
 from planning.planner.plan import plan_mission
 from planning.planner.request import PlanRequest
 from planning.terrain.catalogue.best import seam_m
-from planning.terrain.catalogue.catalogue import Catalogue
+from planning.terrain.catalogue.joined_models import Catalogue
 from planning.terrain.catalogue.models import Opened
 from planning.terrain.dsm import Dsm
 from planning.terrain.geotiff import open_models_of

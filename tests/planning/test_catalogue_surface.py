@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from planning.errors import RasterTooLargeError
 from planning.terrain.catalogue.best import NO_MODEL, layers_of, surface_of
-from planning.terrain.catalogue.catalogue import Catalogue
+from planning.terrain.catalogue.joined_models import Catalogue
 from planning.terrain.catalogue.models import CatalogueModel, Opened
 from planning.terrain.dsm import Dsm
 from planning.terrain.rasters.header import RasterLimits
@@ -76,7 +76,7 @@ def test_a_part_is_that_of_the_whole(found: tuple[CatalogueModel, ...], data: st
     surface = catalogue_of(found)
     monkey = pytest.MonkeyPatch()
     with monkey.context() as patch:
-        patch.setattr("planning.terrain.catalogue.catalogue.AHEAD_PX", 0)
+        patch.setattr("planning.terrain.catalogue.joined_models.AHEAD_PX", 0)
         part = surface.window(row, column, rows, columns)
     expected = whole.window(row, column, rows, columns)
     np.testing.assert_array_equal(part.elevation_m, expected.elevation_m)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from planning.errors import MissingCrsError, ParameterError, RasterError
 from planning.terrain import BOUND_RMS
-from planning.terrain.catalogue.listing import LeftOut, Listed, Listing
+from planning.terrain.catalogue.listed_models import LeftOut, Listed, Listing
 from planning.terrain.projects import is_terrain
 from planning.terrain.rasters.dsm_file import DsmFile
 from planning.terrain.rasters.reading import Declared, Progress

@@ -2,7 +2,7 @@
 
 Plain JSON is read, no library of STAC: pystac brings two dozen distributions along and opens whatever a document
 names. What a document names counts only as a path below the catalogue's folder; who reads it is asked elsewhere
-(``listing``).
+(``listed_models``).
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from typing import Any
 from mapping.geometry.arrays import F64
 from planning.errors import ParameterError
 from planning.planner.part import FLIGHT_MARGIN_M, needed_part
-from planning.terrain.catalogue.catalogue import Catalogue
+from planning.terrain.catalogue.joined_models import Catalogue
 from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.geotiff import open_dsm, open_models_of, read_dsm_reported
 from planning.terrain.rasters.http_ranges import RemoteFile, is_address

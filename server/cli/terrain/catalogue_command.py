@@ -10,7 +10,7 @@ import typer
 from typer import Argument, Option
 
 from planning.errors import ParameterError
-from planning.terrain.catalogue.catalogue import Catalogue
+from planning.terrain.catalogue.joined_models import Catalogue
 from planning.terrain.catalogue.models import CatalogueModel
 from planning.terrain.geotiff import open_models_of
 from server.cli.shared import options as o

@@ -23,7 +23,7 @@ from planning.terrain.catalogue.best import (
     layers_of,
     surface_of,
 )
-from planning.terrain.catalogue.listing import LeftOut, listing_of
+from planning.terrain.catalogue.listed_models import LeftOut, listing_of
 from planning.terrain.catalogue.models import CatalogueModel, Opened, open_models
 from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.rasters.dsm_file import AHEAD_PX
