@@ -46,7 +46,7 @@ def test_files_are_opened_judged_and_told(tmp_path: Path) -> None:
     write_raster(tmp_path / "other_datum.tif", FLAT, tags={"HEDGEHOP_VERTICAL_DATUM": "ellipsoid"})
     write_raster(tmp_path / "site_dtm.tif", FLAT)
     (tmp_path / "broken.tif").write_bytes(b"II*\0 and no more")
-    found = open_models_of(tmp_path)
+    found = open_models_of(tmp_path, vertical_datum="EGM96 height")
     assert [model.name for model in found.models] == ["new", "late", "old"]
     # What nobody told: one cell, and no better than the worst that was told.
     assert [(model.rms_m, model.rms_told) for model in found.models] == [(0.1, True), (0.6, True), (1.0, False)]
@@ -85,6 +85,47 @@ def test_what_is_declared_is_of_those_that_say_nothing(tmp_path: Path) -> None:
         open_models_of(tmp_path, z_scale=0.01)
 
 
+def test_models_whose_datum_nobody_tells_are_not_joined(tmp_path: Path) -> None:
+    """One was above the ellipsoid, one above the sea: a plan was certified 28 m below the ground."""
+    write_raster(tmp_path / "new.tif", FLAT)
+    item(tmp_path, "new.tif", datetime="2026-05-01T10:00:00Z")
+    write_raster(tmp_path / "old.tif", FLAT + 28)
+    alone = open_models_of(tmp_path)
+    assert [model.name for model in alone.models] == ["new"]
+    assert [(out.name, "not told" in out.why) for out in alone.left_out] == [("old", True)]
+    assert float(np.nanmax(alone.whole().elevation_m)) == 3.0
+    both = open_models_of(tmp_path, vertical_datum="EGM96 height")
+    assert [model.name for model in both.models] == ["new", "old"]
+    item(tmp_path, "new.tif", datetime="2026-05-01T10:00:00Z", hedgehop__vertical_datum="EGM96 height")
+    assert [model.name for model in open_models_of(tmp_path).models] == ["new"]
+
+
+@pytest.mark.parametrize(
+    ("datum", "joined"), [("EGM2008 height", True), ("ellipsoid", True), ("local", False), ("unknown", False)]
+)
+def test_models_are_joined_only_in_a_datum_that_both_can_mean(tmp_path: Path, datum: str, *, joined: bool) -> None:
+    for name in ("new", "old"):
+        write_raster(tmp_path / f"{name}.tif", FLAT, tags={"HEDGEHOP_VERTICAL_DATUM": datum})
+    assert len(open_models_of(tmp_path).models) == 1 + joined
+    # Who asks may know that two surveys of a site have the same zero.
+    assert len(open_models_of(tmp_path, vertical_datum=datum).models) == 2
+
+
+def test_cells_of_a_turned_raster_count_where_they_lie(tmp_path: Path) -> None:
+    random = np.random.default_rng(8)
+    write_raster(tmp_path / "near.tif", random.uniform(0, 9, (8, 8)).astype(np.float32))
+    rough = random.uniform(20, 40, (12, 12)).astype(np.float32)
+    turned = Affine.translation(WEST_M + 30.0, NORTH_M) @ Affine.rotation(-31.0) @ Affine.scale(1.5, -1.5)
+    write_raster(tmp_path / "turned.tif", rough, transform=turned)
+    found = open_models_of(tmp_path, vertical_datum="EGM96 height")
+    raised_m = next(layer.raise_m for layer in found.layers if layer.model.name == "turned")
+    columns, rows = np.meshgrid(np.arange(2, 10), np.arange(2, 10))
+    for shift in (0.02, 0.5, 0.98):
+        places = zip(columns.ravel() + shift, rows.ravel() + shift, strict=True)
+        heights = found.elevation_at(np.array([turned @ (float(x), float(y)) for x, y in places]))
+        assert (heights >= rough[2:10, 2:10].ravel() + raised_m - 1e-3).all()
+
+
 def test_cells_in_degrees_count_where_they_lie(tmp_path: Path) -> None:
     """Bent and oblong in metres: every one of them stands under the surface where it is the only model."""
     random = np.random.default_rng(5)
@@ -92,13 +133,13 @@ def test_cells_in_degrees_count_where_they_lie(tmp_path: Path) -> None:
     rough = random.uniform(20, 40, (12, 12)).astype(np.float32)
     west, north = 15.0, 37.6775
     write_raster(tmp_path / "far.tif", rough, crs="EPSG:4326", transform=Affine(3e-5, 0.0, west, 0.0, -2e-5, north))
-    found = open_models_of(tmp_path)
+    found = open_models_of(tmp_path, vertical_datum="EGM96 height")
     assert {model.name for model in found.models} == {"near", "far"}, found.warnings
     raised_m = next(layer.raise_m for layer in found.layers if layer.model.name == "far")
     columns, rows = np.meshgrid(np.arange(1, 11), np.arange(1, 11))
     for shift in (0.02, 0.5, 0.98):
-        places = np.column_stack([north - 2e-5 * (rows.ravel() + shift), west + 3e-5 * (columns.ravel() + shift)])
-        heights = found.elevation_at(found.xy_from_lat_lon(places))
+        places = [north - 2e-5 * (rows.ravel() + shift), west + 3e-5 * (columns.ravel() + shift)]
+        heights = found.elevation_at(found.xy_from_lat_lon(np.column_stack(places).astype(np.float64)))
         assert (heights >= rough[1:11, 1:11].ravel() + raised_m - 1e-3).all()
 
 

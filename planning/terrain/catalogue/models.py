@@ -13,7 +13,7 @@ from planning.terrain.catalogue.listed_models import LeftOut, Listed, Listing
 from planning.terrain.projects import is_terrain
 from planning.terrain.rasters.dsm_file import DsmFile
 from planning.terrain.rasters.reading import Declared, Progress
-from planning.terrain.vertical_datum import datums_differ
+from planning.terrain.vertical_datum import datums_differ, is_amsl
 
 GOOD_RMS_M = 0.5
 """Of models at least so exact the newest is the best; of others the most exact."""
@@ -88,7 +88,7 @@ def open_models(listing: Listing, declared: Declared, progress: Progress | None)
         except RasterError as error:
             left_out.append(LeftOut(listed.path.name, " ".join(part for part in (error.what, error.advice) if part)))
     ranked = sorted(_with_errors(found), key=lambda model: (model.order, model.name, model.file.sha256))
-    fitting = _fitting(ranked, left_out)
+    fitting = _fitting(ranked, declared.vertical_datum, left_out)
     if not fitting:
         first = next(iter(left_out), None)
         why = "" if first is None else f" {first.name}: {first.why}"
@@ -140,11 +140,11 @@ def _with_errors(models: Sequence[CatalogueModel]) -> list[CatalogueModel]:
     return [model if model.rms_told else replace(model, rms_m=max(model.rms_m, worst_m)) for model in models]
 
 
-def _fitting(ranked: Sequence[CatalogueModel], left_out: list[LeftOut]) -> list[CatalogueModel]:
-    """Those in the reference system and vertical datum of the best."""
-    fitting: list[CatalogueModel] = []
-    for model in ranked:
-        why = _misfit(ranked[0], model)
+def _fitting(ranked: Sequence[CatalogueModel], declared: str | None, left_out: list[LeftOut]) -> list[CatalogueModel]:
+    """The best, and those in its reference system and vertical datum."""
+    fitting = list(ranked[:1])
+    for model in ranked[1:]:
+        why = _misfit(ranked[0], model, declared)
         if why:
             left_out.append(LeftOut(model.name, why))
         else:
@@ -152,17 +152,25 @@ def _fitting(ranked: Sequence[CatalogueModel], left_out: list[LeftOut]) -> list[
     return fitting
 
 
-def _misfit(best: CatalogueModel, other: CatalogueModel) -> str:
-    """Why a model cannot be used beside the best one; empty: it can."""
+def _misfit(best: CatalogueModel, other: CatalogueModel, declared: str | None) -> str:
+    """Why a model cannot be used beside the best one; empty: it can. Two datums that nobody tells may differ."""
     if not best.file.crs.equals(other.file.crs, ignore_axis_order=True):
         return (
             f"It is in {other.file.crs.name}, {best.name} in {best.file.crs.name}. "
             "Bring it there, heights never lowered: gdalwarp -r max -t_srs CRS."
         )
     one, two = best.vertical_datum, other.vertical_datum
-    if datums_differ(one, two) or (one is None) != (two is None):
+    if not (_is_shared(one, declared) and _is_shared(two, declared)) or datums_differ(one, two):
         return (
             f"Its vertical datum is {two or 'not told'}, that of {best.name} {one or 'not told'}: heights may lie tens "
             "of metres apart. Bring both to one datum, or declare it for all."
         )
     return ""
+
+
+def _is_shared(datum: str | None, declared: str | None) -> bool:
+    """Whether two models that name it mean the same: not so "local" or "unknown", unless who asks says that they do."""
+    if datum is None:
+        return False
+    says_so = declared is not None and not datums_differ(datum, declared)
+    return says_so or is_amsl(datum) or "ellipsoid" in datum.lower()
