@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from planning.errors import RasterError, RasterFormatError, RasterTooLargeError
 from planning.terrain.catalogue.listed_models import MOST_MODELS, Listing, listing_of
-from planning.terrain.catalogue.stac import MOST_BYTES
+from planning.terrain.catalogue.stac import MOST_ASSETS, MOST_BYTES
 from tests.planning.catalogue_samples import item
 
 
@@ -98,6 +98,9 @@ def test_nothing_outside_the_folder_is_listed(tmp_path: Path, href: str) -> None
         ({"hedgehop__vertical_rms_m": "0.1"}, "no STAC document"),
         ({"hedgehop__horizontal_rms_m": 1e9}, "at most 100"),
         ({"gsd": 0}, "gsd is 0"),
+        ({"gsd": 1e300}, "at most 100"),
+        ({"hedgehop__vertical_datum": "EGM96" * 30}, "vertical_datum"),
+        ({"hedgehop__vertical_datum": "EGM96\u202e"}, "vertical_datum"),
         ({"datetime": "yesterday"}, "its date 'yesterday' is none"),
         ({"datetime": 2026}, "no STAC document"),
     ],
@@ -112,6 +115,80 @@ def test_what_cannot_be_told_is_said(tmp_path: Path, properties: dict[str, Any],
     found = listing_of(folder)
     assert [model.told.vertical_rms_m for model in found.models] == [None]
     assert [out.name for out in found.left_out] == ["a.json"]
+
+
+def assets(path: Path, made: dict[str, Any], **document: Any) -> None:
+    """Puts other assets into an item: their keys, and each one's href or all of it."""
+    whole = {key: {"href": asset} if isinstance(asset, str) else asset for key, asset in made.items()}
+    found = json.loads(path.read_text())
+    found["properties"] |= document
+    path.write_text(json.dumps(found | {"assets": whole}))
+
+
+@pytest.mark.parametrize(
+    ("made", "title", "model"),
+    [
+        ({"dsm": "./a.tif", "dtm": "./b.tif"}, "", "a.tif"),
+        ({"data": "./a.tif", "terrain": "./b.tif"}, "", "a.tif"),
+        ({"a": "./a.tif", "b": {"href": "./b.tif", "title": "Bare earth"}}, "", "a.tif"),
+        ({"data": {"href": "./a.tif", "title": "Digital Terrain Model"}, "dsm": "./b.tif"}, "", "b.tif"),
+        ({"dsm": "./a.tif", "ortho": "https://elsewhere.example/b.tif", "dtm": "../b.tif"}, "", "a.tif"),
+        ({"dsm": "./a.tif", "height": "./b.tif"}, "Terrain of the valley", "a.tif"),
+        ({"dsm": {"href": "./a.tif", "roles": ["thumbnail"]}, "one": "./b.tif"}, "", "b.tif"),
+        ({"dtm": "./a.tif"}, "", None),
+        ({"data": "./a.tif"}, "Terrain model 2019", None),
+        ({"data": {"href": "./a.tif", "title": "DTM"}, "dtm": "./b.tif"}, "", None),
+        ({"left": "./a.tif", "right": "./b.tif"}, "", None),
+        ({"dsm": "./a.tif", "surface": "./b.tif"}, "", None),
+    ],
+)
+def test_bare_terrain_and_what_else_an_item_names_are_no_surface_models(
+    tmp_path: Path, made: dict[str, Any], title: str, model: str | None
+) -> None:
+    """Neither by the item nor as a raster of the folder that nothing is told of."""
+    folder = folder_with(tmp_path, "a.tif", "b.tif")
+    path = item(folder, "a.tif")
+    assets(path, made, title=title)
+    named, every = listing_of(path), listing_of(folder)
+    assert listed(named) == [model] * (model is not None)
+    unnamed = [] if "./b.tif" in json.dumps(made).replace("../", "") else ["b.tif"]
+    assert listed(every) == sorted([*listed(named), *unnamed])
+    assert len(named.left_out) == (model is None)
+    assert len(every.left_out) == (model is None) + 2 - len(listed(every))
+
+
+def test_a_raster_that_one_item_calls_terrain_and_another_its_surface_is_in_doubt(tmp_path: Path) -> None:
+    folder = folder_with(tmp_path, "a.tif", "b.tif")
+    first, second = item(folder, "a.tif"), item(folder, "b.tif")
+    assets(first, {"dsm": "./a.tif", "dtm": "./b.tif"})
+    assert listed(listing_of(folder)) == ["a.tif"]
+    second.rename(folder / "0.json")  # read first
+    assert listed(listing_of(folder)) == ["a.tif"]
+
+
+def test_too_many_links_and_assets_are_refused(tmp_path: Path) -> None:
+    folder = folder_with(tmp_path, "a.tif")
+    path = item(folder, "a.tif")
+    assets(path, {str(k): "./a.tif" for k in range(MOST_ASSETS + 1)})
+    with pytest.raises(RasterError, match="more than 100 assets"):
+        listing_of(path)
+    assets(path, {"dsm": "./a.tif"})
+    links = [{"rel": "item", "href": "a.json"}] * 100_000
+    source = folder / "catalog.json"
+    source.write_text(json.dumps({"type": "Catalog", "stac_version": "1.0.0", "id": "x", "links": links}))
+    with pytest.raises(RasterTooLargeError, match="more than 1,000 links"):
+        listing_of(source)
+
+
+def test_documents_that_name_each_other_are_read_once(tmp_path: Path) -> None:
+    folder = folder_with(tmp_path, "a.tif")
+    item(folder, "a.tif")
+    for name, other in (("one", "two"), ("two", "one")):
+        links = [{"rel": "child", "href": f"{other}.json"}, {"rel": "child", "href": f"{name}.json"}]
+        links.append({"rel": "item", "href": "a.json"})
+        made = {"type": "Catalog", "stac_version": "1.0.0", "id": name, "links": links}
+        (folder / f"{name}.json").write_text(json.dumps(made))
+    assert listed(listing_of(folder / "one.json")) == ["a.tif"]
 
 
 def test_two_items_that_differ_leave_their_raster_out(tmp_path: Path) -> None:

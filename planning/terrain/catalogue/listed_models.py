@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -73,7 +74,7 @@ def _in_folder(folder: Path) -> Listing:
 
 def _named_by(source: Path) -> Listing:
     made, waiting, seen = _Made(source.parent), [source], {source.resolve()}
-    first = read_document(source)
+    first, links = read_document(source), 0
     while waiting:
         document = waiting.pop()
         found = first if document is source else made.read(document)
@@ -82,6 +83,8 @@ def _named_by(source: Path) -> Listing:
         if found.is_item:
             made.add_item(document, found)
         for href in found.named:
+            links += 1
+            _check_count(links, MOST_DOCUMENTS, "links", source)
             path = made.below(document, href)
             if path is not None and path.resolve() not in seen:
                 seen.add(path.resolve())
@@ -98,6 +101,7 @@ class _Made:
         self.root, self.models = root, dict[Path, Listed]()
         self._left_out: list[LeftOut] = []
         self._doubtful: set[Path] = set()
+        self._others: set[Path] = set()
 
     def read(self, document: Path) -> Document | None:
         """None for one that cannot be read, which is told."""
@@ -116,7 +120,11 @@ class _Made:
             return None
 
     def add_item(self, document: Path, item: Document) -> None:
-        if len(item.rasters) != 1:
+        one = len(item.rasters) == 1
+        for href in item.others if one else (*item.others, *item.rasters):
+            with suppress(RasterError):  # what is not read anyway may lie elsewhere
+                self._others.add(path_below(self.root, document, href))
+        if not one:
             many = f"{len(item.rasters)} GeoTIFFs, and none alone" if item.rasters else "no GeoTIFF"
             why = f"The item names {many} as its surface model. Name it as the asset “dsm”."
             self._left_out.append(LeftOut(document.name, why))
@@ -136,12 +144,16 @@ class _Made:
         except RasterError as error:
             self._leave_out(raster.name, error)
             return
+        if path in self._others and path not in self.models:
+            self._left_out.append(LeftOut(raster.name, "An item names it, and not as its one surface model."))
+            return
         self.models.setdefault(path, Listed(path, Told()))
 
     def listing(self) -> Listing:
         twice = "Two items tell different things of it. Keep the right one."
-        doubtful = [LeftOut(path.name, twice) for path in sorted(self._doubtful)]
-        kept = (listed for path, listed in sorted(self.models.items()) if path not in self._doubtful)
+        in_doubt = self._doubtful | (self._others & self.models.keys())
+        doubtful = [LeftOut(path.name, twice) for path in sorted(in_doubt)]
+        kept = (listed for path, listed in sorted(self.models.items()) if path not in in_doubt)
         return Listing(tuple(kept), (*self._left_out, *doubtful))
 
     def _leave_out(self, name: str, error: RasterError) -> None:

@@ -8,6 +8,7 @@ names. What a document names counts only as a path below the catalogue's folder;
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -17,17 +18,23 @@ from urllib.parse import unquote
 import msgspec
 
 from planning.errors import RasterError, RasterFormatError
+from planning.terrain.projects import SURFACE, is_terrain
 
 MOST_BYTES = 4 * 2**20
 MOST_RMS_M = 20.0
 """Vertical; a larger error is no surface model to fly on."""
 MOST_HORIZONTAL_M = 100.0
+MOST_GSD_M = 100.0
 _ROLES_LEFT_OUT = {"thumbnail", "overview", "visual", "metadata"}
 _SURFACE_KEYS = {"dsm", "surface", "elevation", "data"}
+_SURFACE = re.compile(f"surface|{SURFACE.pattern}")
 _ENDINGS = (".tif", ".tiff")
+MOST_ASSETS = 100
+MOST_DATUM = 100
 
 
 class _Properties(msgspec.Struct):
+    title: str | None = None
     datetime: str | None = None
     start_datetime: str | None = None
     gsd: float | None = None
@@ -38,6 +45,7 @@ class _Properties(msgspec.Struct):
 
 class _Asset(msgspec.Struct):
     href: str
+    title: str | None = None
     roles: list[str] | None = None
 
 
@@ -75,6 +83,8 @@ class Document:
     told: Told
     rasters: tuple[str, ...]
     """Of an item: what its assets name, as it is written there; each may be the surface model."""
+    others: tuple[str, ...]
+    """Rasters that an item names as something else."""
     named: tuple[str, ...]
     """Items and catalogues that it names, as they are written there."""
     is_item: bool
@@ -93,10 +103,13 @@ def read_document(path: Path) -> Document:
         raise RasterFormatError(
             f"It is no STAC document ({error}).", where=where, advice="Write it again, or leave it out."
         ) from error
+    if len(found.assets or {}) > MOST_ASSETS:
+        raise RasterError(f"It has more than {MOST_ASSETS} assets.", where=where, advice="Split it.")
     is_item = found.type == "Feature"
     named = [link.href for link in found.links or () if link.rel in ("item", "child") and not is_item]
-    rasters = _rasters(found.assets or {}) if is_item else ()
-    return Document(_told(found, where), rasters, tuple(named), is_item)
+    title = (found.properties and found.properties.title) or ""
+    rasters, others = _rasters(found.assets or {}, title) if is_item else ((), ())
+    return Document(_told(found, where), rasters, others, tuple(named), is_item)
 
 
 def path_below(root: Path, document: Path, href: str) -> Path:
@@ -127,15 +140,29 @@ def file_below(root: Path, file: Path, where: str, name: str) -> Path:
     return path
 
 
-def _rasters(assets: dict[str, _Asset]) -> tuple[str, ...]:
-    """Those that say by their key that they are the surface model, else all that may be."""
-    found = {
-        key: asset.href
-        for key, asset in assets.items()
-        if asset.href.lower().endswith(_ENDINGS) and not _ROLES_LEFT_OUT & set(asset.roles or ())
-    }
-    said = [href for key, href in found.items() if key.lower() in _SURFACE_KEYS]
-    return tuple(said if len(said) == 1 else found.values())
+def _rasters(assets: dict[str, _Asset], title: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The one that says by its key that it is the surface model, else all that may be; and all other rasters."""
+    rasters = {key: asset for key, asset in assets.items() if asset.href.lower().endswith(_ENDINGS)}
+    may_be = [key for key, asset in rasters.items() if not _is_another(key, asset, title)]
+    said = [key for key in may_be if key.lower() in _SURFACE_KEYS]
+    chosen = said if len(said) == 1 else may_be
+    others = (asset.href for key, asset in rasters.items() if key not in chosen)
+    return tuple(rasters[key].href for key in chosen), tuple(others)
+
+
+def _is_another(key: str, asset: _Asset, title: str) -> bool:
+    """Whether an asset is no surface model by its words: a picture, or terrain without trees and buildings.
+
+    Its item's title counts where its own words do not say that it is one.
+    """
+    own = (key, asset.title or "")
+    if _ROLES_LEFT_OUT & set(asset.roles or ()) or any(_says_terrain(text) for text in own):
+        return True
+    return _says_terrain(title) and not any(_SURFACE.search(text.lower()) for text in own)
+
+
+def _says_terrain(text: str) -> bool:
+    return is_terrain(text) or ("terrain" in text.lower() and not _SURFACE.search(text.lower()))
 
 
 def _told(found: _Document, where: str) -> Told:
@@ -143,10 +170,10 @@ def _told(found: _Document, where: str) -> Told:
     return Told(
         name=_short("".join(letter for letter in found.id if letter.isprintable())),
         taken_utc=_time(said.datetime or said.start_datetime, where),
-        gsd_m=_positive(said.gsd, "gsd", math.inf, where),
+        gsd_m=_positive(said.gsd, "gsd", MOST_GSD_M, where),
         vertical_rms_m=_positive(said.vertical_rms_m, "hedgehop:vertical_rms_m", MOST_RMS_M, where),
         horizontal_rms_m=_positive(said.horizontal_rms_m, "hedgehop:horizontal_rms_m", MOST_HORIZONTAL_M, where),
-        vertical_datum=said.vertical_datum or None,
+        vertical_datum=_datum(said.vertical_datum, where),
     )
 
 
@@ -163,11 +190,22 @@ def _time(text: str | None, where: str) -> datetime | None:
         ) from error
 
 
+def _datum(text: str | None, where: str) -> str | None:
+    if not text or not text.strip():
+        return None
+    if len(text) > MOST_DATUM or not text.isprintable():
+        raise RasterFormatError(
+            f"Its hedgehop:vertical_datum {_short(text)!r} is none.", where=where, advice='Name one: "EGM2008 height".'
+        )
+    return text.strip()
+
+
 def _positive(value: float | None, name: str, most: float, where: str) -> float | None:
     if value is None or (math.isfinite(value) and 0.0 < value <= most):
         return value
-    limit = f" and at most {most:g}" if math.isfinite(most) else ""
-    raise RasterFormatError(f"Its {name} is {value:g}.", where=where, advice=f"Give metres above 0{limit}.")
+    raise RasterFormatError(
+        f"Its {name} is {value:g}.", where=where, advice=f"Give metres above 0 and at most {most:g}."
+    )
 
 
 def _short(text: str) -> str:
