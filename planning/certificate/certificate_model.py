@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from mapping.geometry.arrays import F64
 from planning.fence.judge import FenceVerdict
-from planning.margins.budget import ClearanceBudget
+from planning.margins.budget import ClearanceBudget, Term
+from planning.margins.words import is_by_hand
+from planning.terrain import BOUND_RMS
 
 SET_DOWN_M = 0.1
 """What is planned holds for a vehicle that stands up to so far beside the planned home."""
@@ -40,6 +42,29 @@ class ClearanceParams:
     def fence_margin_m(self) -> float:
         """Kept from a fence: how far the vehicle's outermost point may be beside where it should be."""
         return self.vehicle_radius_m + self.position_error_m + self.following_m
+
+
+def with_accuracy(params: ClearanceParams, rms_m: float | None) -> ClearanceParams:
+    """The same, allowing for no less than the RMS error that a surface model tells; None: it tells none.
+
+    A required clearance that was set by hand stays; then it covers less.
+    """
+    budget = params.budget
+    if budget is None or rms_m is None:
+        return params
+    short_m = BOUND_RMS * rms_m - budget.value_m("dsm_accuracy")
+    if short_m <= 0.0:
+        return params
+    grown = _told_by_model(budget, rms_m)
+    if is_by_hand(budget, params.required_clearance_m):
+        return replace(params, budget=grown)
+    return replace(params, budget=grown, required_clearance_m=params.required_clearance_m + short_m)
+
+
+def _told_by_model(budget: ClearanceBudget, rms_m: float) -> ClearanceBudget:
+    source = f"{BOUND_RMS:g} x RMS error of {rms_m:g} m, told with the surface model"
+    told = Term("dsm_accuracy", BOUND_RMS * rms_m, source)
+    return ClearanceBudget(tuple(told if term.code == "dsm_accuracy" else term for term in budget.terms))
 
 
 @dataclass(frozen=True, slots=True)

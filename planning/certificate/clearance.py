@@ -21,7 +21,6 @@ from pyproj import Proj
 from mapping.geometry.arrays import F64
 from mapping.version import __version__
 from planning.basics.plan_model import FlownLine
-from planning.certificate.accuracy import with_accuracy
 from planning.certificate.as_json import certificate_json
 from planning.certificate.certificate_model import (
     Certificate,
@@ -30,6 +29,7 @@ from planning.certificate.certificate_model import (
     LegClearance,
     Reason,
     WorstPoint,
+    with_accuracy,
 )
 from planning.certificate.fenced import fence_reason, fence_verdict, rally_reasons
 from planning.certificate.home_ground import FREE_SLOPE, FREE_STEP_M

@@ -52,7 +52,7 @@ def laid_route(model: SurfaceModel, request: PlanRequest, home: Home) -> Route:
     """Raises PoiError that names every point where the fence lets nobody be."""
     if not has_shapes(request):
         return _straight(model, request, home)
-    kept = _kept(request, (home.lat_deg, home.lon_deg))
+    kept = _kept(model, request, (home.lat_deg, home.lon_deg))
     if request.survey is not None:
         request = replace(request, pois=fenced_lines(model, request.pois, kept, ways_back=True))
     straight = _straight(model, request, home)
@@ -76,7 +76,7 @@ def before_home(model: SurfaceModel, request: PlanRequest) -> PlanRequest:
     if request.survey is None or not has_shapes(request):
         return request
     first = request.home_lat_lon_deg or (request.pois[0].lat_deg, request.pois[0].lon_deg)
-    return replace(request, pois=fenced_lines(model, request.pois, _kept(request, first), ways_back=False))
+    return replace(request, pois=fenced_lines(model, request.pois, _kept(model, request, first), ways_back=False))
 
 
 def home_place(model: SurfaceModel, home: Home) -> F64:
@@ -84,8 +84,8 @@ def home_place(model: SurfaceModel, home: Home) -> F64:
     return model.xy_from_lat_lon(np.array([(home.lat_deg, home.lon_deg)]))
 
 
-def _kept(request: PlanRequest, home_lat_lon_deg: LatLon) -> Kept:
-    clearance = request.clearance()
+def _kept(model: SurfaceModel, request: PlanRequest, home_lat_lon_deg: LatLon) -> Kept:
+    clearance = request.clearance_over(model)
     return Kept(
         fence=request.fence,
         home_lat_lon_deg=home_lat_lon_deg,

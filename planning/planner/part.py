@@ -77,9 +77,9 @@ def felt_m(request: PlanRequest) -> float:
     return 1.5 * surface.radius_m + 5.0 * sigma_m + surface.height_m
 
 
-def least_margin_m(request: PlanRequest) -> float:
+def least_margin_m(model: SurfaceModel, request: PlanRequest) -> float:
     """Beyond the points' bounding box: what the safe surface feels, and where the certificate should find ground."""
-    return felt_m(request) + request.clearance().required_clearance_m + MARGIN_M
+    return felt_m(request) + request.clearance_over(model).required_clearance_m + MARGIN_M
 
 
 def needed_part(model: SurfaceModel, xy_m: F64, margin_m: float) -> Dsm:

@@ -109,7 +109,7 @@ def plan_mission(
     request = before_home(model, request)
     report(SURFACE_STEP, 0.0)
     grounds = Grounds(model, request.surface.fill_hole_area_m2)
-    first = grounds.around(_points(model, request), least_margin_m(request))
+    first = grounds.around(_points(model, request), least_margin_m(model, request))
     check_pois(request.pois, first.filled, bounds_m=model.bounds_m)
     job = _Job(request, grounds, report, assumptions or {})
     home, why = _home(model, request)
@@ -146,7 +146,10 @@ def _planned_from(job: _Job, home: Home, why_moved: str) -> Plan:
         return was_enough(ground, model, plan.line, plan.certificate, felt_m=feels_m)
 
     return job.grounds.judged(
-        points_xy_m, least_margin_m(request), lambda ground: _planned(job, ground, home, why_moved, route), is_enough
+        points_xy_m,
+        least_margin_m(model, request),
+        lambda ground: _planned(job, ground, home, why_moved, route),
+        is_enough,
     )
 
 
@@ -166,7 +169,7 @@ def _planned(job: _Job, ground: Ground, home: Home, why_moved: str, route: Route
     job.report(CERTIFICATE_STEP, 0.8)
     line = read_back(built.mission, filled)
     assumed = {**_assumptions(request, surfaces, holes), **job.assumptions}
-    certificate = certify(filled, line, request.clearance(), ground=job.model, assumptions=assumed)
+    certificate = certify(filled, line, request.clearance_over(filled), ground=job.model, assumptions=assumed)
     predicted = predict_duration(built.mission, profile, filled)
     coverage = _coverage(filled, request, line)
     return Plan(
@@ -184,7 +187,7 @@ def _planned(job: _Job, ground: Ground, home: Home, why_moved: str, route: Route
         coverage=coverage,
         feasibility=_feasibility(built.mission, profile, predicted, coverage),
         detours=route.detours,
-        warnings=(*home_notes, *route.notes, *built.warnings, *_warnings(request)),
+        warnings=(*home_notes, *route.notes, *built.warnings, *_warnings(filled, request)),
     )
 
 
@@ -267,13 +270,13 @@ def _home(model: SurfaceModel, request: PlanRequest) -> tuple[Home, str]:
     place = (round(lat_deg, HOME_DECIMALS), round(lon_deg, HOME_DECIMALS))
     if request.home_lat_lon_deg is not None:
         return home_from_dsm(model, place), ""
-    return default_home(model, place, request.clearance(), most_drop_m=_expected_spare_m(request))
+    return default_home(model, place, request.clearance_over(model), most_drop_m=_expected_spare_m(model, request))
 
 
-def _expected_spare_m(request: PlanRequest) -> float:
+def _expected_spare_m(model: SurfaceModel, request: PlanRequest) -> float:
     """Clearance beyond what is required, before there is a line: the surface's floor lies 0.8 H above the model."""
     floor_m = FLOOR_SHARE * request.surface.height_m if request.surface.floor else 0.0
-    return max(DROP_M, floor_m - request.clearance().required_clearance_m)
+    return max(DROP_M, floor_m - request.clearance_over(model).required_clearance_m)
 
 
 def _loiter_s(request: PlanRequest, vertex_poi: tuple[int | None, ...]) -> np.ndarray:
@@ -290,7 +293,8 @@ def _mission(job: _Job, dsm: Dsm, profile: VehicleProfile, path: SampledPath, ho
     if request.mission.end == "rtl" or request.mission.land_transit_height_m is not None:
         return build(request.mission)
     scout = build(replace(request.mission, end="rtl")).mission
-    needed_m = certify(dsm, flown_line(scout, dsm), request.clearance(), ground=job.model).rtl_height_needed_m
+    demanded = request.clearance_over(dsm)
+    needed_m = certify(dsm, flown_line(scout, dsm), demanded, ground=job.model).rtl_height_needed_m
     return build(request.mission, needed_m if math.isfinite(needed_m) else profile.rtl_height_m)
 
 
@@ -319,7 +323,7 @@ def _coverage(dsm: Dsm, request: PlanRequest, line: FlownLine) -> SurveyCoverage
     return survey_coverage(dsm, line, request.survey, camera, request.mission)
 
 
-def _warnings(request: PlanRequest) -> list[str]:
-    demanded = request.clearance()
+def _warnings(dsm: Dsm, request: PlanRequest) -> list[str]:
+    demanded = request.clearance_over(dsm)
     uncovered = uncovered_words(demanded.budget, demanded.required_clearance_m)
     return [] if uncovered is None else [uncovered]

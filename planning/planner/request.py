@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 from planning.basics import limits
 from planning.basics.plan_model import MissionParams, PathParams, PlannedFor, Poi, SurfaceParams, VehicleProfile
-from planning.certificate.certificate_model import ClearanceParams
+from planning.certificate.certificate_model import ClearanceParams, with_accuracy
 from planning.errors import ParameterError
 from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint
 from planning.margins.following_error import Way
@@ -60,6 +60,10 @@ class PlanRequest:
             max_height_above_ground_m=self.max_height_above_ground_m,
             budget=budget,
         )
+
+    def clearance_over(self, model: SurfaceModel) -> ClearanceParams:
+        """The same over a surface model, which may tell how exact it is."""
+        return with_accuracy(self.clearance(), model.rms_m)
 
 
 def clearance_of_planned(planned: PlannedFor) -> ClearanceParams:

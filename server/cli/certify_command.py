@@ -53,10 +53,10 @@ def certify(
     fence, rally = fence_given(keep_to.fence, flight)
     flight = replace(flight, fence=fence, rally=rally)
     request = judged_by(flight, given, demands, demands.flown_as)
-    vehicle, params = request.profile, request.clearance()
+    vehicle = request.profile
     timer = StepTimer(progress)
     opened = open_model(dsm, timer, model)
-    source = opened.model
+    source, params = opened.model, request.clearance_over(opened.model)
     other = other_surface(flight, source)
     uncovered = uncovered_words(params.budget, params.required_clearance_m)
     warnings = [

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mapping.geometry.arrays import F64, I64
+from planning.certificate.certificate_model import with_accuracy
 from planning.following.below import Demanded, below_required
 from planning.following.figures import Judged, TrackFigures
 from planning.following.lag import planned_alt_dsm_m
@@ -77,7 +78,7 @@ def demanded_of(flight: Flight) -> Demanded | None:
     planned = None if flight.mission is None else flight.mission.planned_for
     if planned is None:
         return None
-    params = clearance_of_planned(planned)
+    params = with_accuracy(clearance_of_planned(planned), flight.dsm.rms_m)
     return Demanded(params.required_clearance_m, params.following_m)
 
 

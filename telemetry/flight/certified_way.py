@@ -11,7 +11,7 @@ import numpy as np
 
 from mapping.geometry.frames import apart_m
 from planning.basics.plan_model import Firmware, VehicleProfile
-from planning.certificate.certificate_model import ClearanceParams, Reason
+from planning.certificate.certificate_model import ClearanceParams, Reason, with_accuracy
 from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint, within_both
 from planning.guided.guided_model import RETURNS, Back, Demand, GuidedWay, Here, Look, Orbit, TakeOff, Wish
 from planning.guided.ways import guided_way
@@ -102,6 +102,7 @@ def judged_way(
     Raises NotAllowedError, MissionError and ParameterError.
     """
     here, profile = here_of(state, wish, now_s), flown.profile
+    flown = replace(flown, clearance=with_accuracy(flown.clearance, ground.rms_m))
     if not 0.0 < speed_m_s <= profile.max_speed_m_s:
         what = f"{speed_m_s:g} m/s were asked for; the profile's top speed is {profile.max_speed_m_s:g} m/s."
         raise NotAllowedError(what, advice="Give a speed within that.")

@@ -72,7 +72,7 @@ def test_the_part_grows_until_nothing_that_was_found_is_as_far_as_its_border(mon
         return box_of(model, xy_m, margin_m)
 
     monkeypatch.setattr(part, "_needed_box", noted)
-    monkeypatch.setattr(plan, "least_margin_m", lambda asked: 12.0)
+    monkeypatch.setattr(plan, "least_margin_m", lambda model, asked: 12.0)
     whole, cut = both(monkeypatch, request(height_m=14.0))
     assert margins_m[-2:] == [12.0, 36.0]
     assert_same_flight(cut, whole)

@@ -357,3 +357,8 @@ def test_the_missions_own_file_tells_what_was_required() -> None:
     found = figures(log_of(positions(), flown=planned), dsm=PLAIN)
     assert found.required_distance_m == 15.0
     assert found.below_required is not None
+    # Of a model that tells its error more is required.
+    planned = replace(FLOWN, planned_for=PlannedFor(load_profile("mapper-rtk")))
+    own, told = (figures(log_of(positions(), flown=planned), dsm=dsm) for dsm in (PLAIN, replace(PLAIN, rms_m=0.4)))
+    assert own.required_distance_m is not None
+    assert told.required_distance_m == pytest.approx(own.required_distance_m + 3 * (0.4 - 0.023))

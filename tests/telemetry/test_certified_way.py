@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from planning.basics.plan_model import ANY_VEHICLE
+from planning.certificate.certificate_model import ClearanceParams
 from planning.guided.guided_model import GoTo, GuidedWay, ToHome, Wish
+from planning.missions.vehicle_terms import budget_of
+from planning.terrain.dsm import Dsm
 from telemetry.errors import NotAllowedError
 from telemetry.flight.certified_way import Flown, judged_way, way_request
 from telemetry.flight.home_watch import HomePlace
@@ -19,7 +23,14 @@ DSM = model(flat())
 TOLD: dict[str, float | None] = {"RTL_ALT": 3000.0, "RTL_CONE_SLOPE": 3.0}
 
 
-def judged(wish: Wish, parameters: dict[str, float | None], **more: Any) -> GuidedWay:
+def judged(
+    wish: Wish,
+    parameters: dict[str, float | None],
+    *,
+    dsm: Dsm = DSM,
+    clearance: ClearanceParams = CLEARANCE,
+    **more: Any,
+) -> GuidedWay:
     (home_lat, home_lon), (lat, lon) = at(DSM, *HOME), at(DSM, 70.0, 60.0)
     places: dict[str, Any] = {"lat_deg": lat, "lon_deg": lon, "home_lat_deg": home_lat, "home_lon_deg": home_lon}
     heard: dict[str, Any] = {
@@ -31,8 +42,8 @@ def judged(wish: Wish, parameters: dict[str, float | None], **more: Any) -> Guid
     places["home_alt_amsl_m"] = 100.0
     flies: dict[str, Any] = {"autopilot": "ardupilot", "armed": True, "landed": "in_air", "alt_rel_home_m": 12.0}
     state = VehicleState(1, 1, **(places | heard | flies | more))
-    flown = Flown(ANY_VEHICLE, CLEARANCE, parameters)
-    return judged_way(DSM, None, state, wish, flown, speed_m_s=1.0, now_s=0.0)
+    flown = Flown(ANY_VEHICLE, clearance, parameters)
+    return judged_way(dsm, None, state, wish, flown, speed_m_s=1.0, now_s=0.0)
 
 
 def test_with_all_that_its_return_rests_on_it_may_be_flown() -> None:
@@ -70,9 +81,23 @@ def test_the_vehicles_own_ceiling_is_kept_and_its_floor_stops_no_climb_from_belo
 
 @pytest.mark.parametrize("missing", ["home_lat_deg", "home_lon_deg", "home_alt_amsl_m"])
 def test_without_a_whole_home_nothing_is_certified_that_the_link_could_not_hold_against_it(missing: str) -> None:
+    unknown: dict[str, Any] = {missing: None}
     with pytest.raises(NotAllowedError, match="does not tell its home, place and height") as refused:
-        judged(GoTo(9.0), TOLD, **{missing: None})
+        judged(GoTo(9.0), TOLD, **unknown)
     assert refused.value.advice == "Wait for it."
+
+
+def test_what_the_model_tells_of_its_error_is_demanded_also_beside_what_the_receiver_tells() -> None:
+    """The requirement is then no sum of its terms, and counted as set by hand."""
+    budget = budget_of(ANY_VEHICLE, "guided")
+    asked = replace(CLEARANCE, required_clearance_m=budget.total_m, budget=budget, position_error_m=0.5)
+    told = replace(DSM, rms_m=0.5)
+    more_m = 3 * 0.5 - budget.value_m("dsm_accuracy")
+    receivers: tuple[dict[str, Any], ...] = ({}, {"horizontal_accuracy_m": 0.9})
+    for receiver in receivers:
+        plain = judged(GoTo(9.0), TOLD, clearance=asked, **receiver).certificate
+        worse = judged(GoTo(9.0), TOLD, clearance=asked, dsm=told, **receiver).certificate
+        assert worse.required_clearance_m == pytest.approx(plain.required_clearance_m + more_m)
 
 
 def test_no_way_is_asked_of_the_link_without_the_home_that_it_was_judged_for() -> None:

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from planning.basics.plan_model import MissionItem
+from planning.basics.plan_model import ANY_VEHICLE, MissionItem
 from planning.certificate.clearance import certify
 from planning.missions.flown import flown_line
+from planning.missions.vehicle_terms import budget_of
 from telemetry.errors import NotAllowedError
 from telemetry.flight.preflight.resume import plan_resumption, resume_item
 from tests.server.flight_logs import PLAIN, mission
@@ -34,6 +35,17 @@ def test_the_way_back_is_as_high_as_needed() -> None:
     assert found.certificate.certified
     assert found.certificate.min_distance_m >= 2.0
     assert plan_resumption(low, 3, PLAIN, CLEARANCE).climb_to_m >= 5.0
+
+
+def test_over_a_model_that_tells_its_error_the_way_back_is_higher_by_it() -> None:
+    low = mission([(50.0, 150.0, 20.0), (250.0, 200.0, 9.0), (250.0, 150.0, 9.0)])
+    budget = budget_of(ANY_VEHICLE)
+    asked = replace(CLEARANCE, required_clearance_m=budget.total_m, budget=budget)
+    plain = plan_resumption(low, 4, PLAIN, asked)
+    told = plan_resumption(low, 4, replace(PLAIN, rms_m=0.3), asked)
+    more_m = 3 * 0.3 - budget.value_m("dsm_accuracy")
+    assert told.needed_m == pytest.approx(plain.needed_m + more_m, abs=1e-6)
+    assert told.certificate.required_clearance_m == pytest.approx(plain.certificate.required_clearance_m + more_m)
 
 
 def test_the_way_back_at_a_height_of_the_pilots_choice() -> None:

@@ -102,7 +102,7 @@ def fly(
         address=link,
         operator=OPERATOR,
         profile=request.profile,
-        clearance=request.clearance(),
+        clearance=request.clearance() if model is None else request.clearance_over(model),
         way=mode,
         dsm=model,
         from_item=from_item,

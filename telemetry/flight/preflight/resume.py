@@ -9,7 +9,7 @@ import numpy as np
 
 from planning.basics.mav_cmd import MavCmd, MavFrame
 from planning.basics.plan_model import Mission, MissionItem
-from planning.certificate.certificate_model import Certificate, ClearanceParams
+from planning.certificate.certificate_model import Certificate, ClearanceParams, with_accuracy
 from planning.certificate.clearance import certify
 from planning.certificate.commands import STRAIGHT, stays
 from planning.certificate.pyramid import cells_pyramid
@@ -66,6 +66,7 @@ def plan_resumption(
     ``climb_to_m`` None: as high as needed. Raises NotAllowedError when the way is not clear: with the height
     that would be, if there is one.
     """
+    clearance = with_accuracy(clearance, dsm.rms_m)
     number = resume_item(mission, broke_off_at)
     item, where = mission.items[number - 1], f"the way from home to item {number}"
     needed_m, own_m = _heights(mission, item, dsm, clearance)
