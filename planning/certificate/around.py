@@ -25,6 +25,8 @@ class CellsAround:
     """Of its farthest corner"""
     inside: bool
     """Whether the model reaches as far as the radius all around."""
+    block: tuple[slice, slice]
+    """Its rows and columns among the model's cells."""
 
 
 def cells_around(cells: Cells, xy_m: tuple[float, float], radius_m: float) -> CellsAround:
@@ -36,7 +38,7 @@ def cells_around(cells: Cells, xy_m: tuple[float, float], radius_m: float) -> Ce
     near_m, far_m = np.empty(height_m.shape), np.empty(height_m.shape)
     measure = _of_rectangles if is_rectangular(cells.layout.lattice) else _of_quads
     measure(cells.layout.lattice, rows.start, columns.start, x, y, near_m, far_m)
-    return CellsAround(height_m, near_m, far_m, _holds(cells, place, radius_m))
+    return CellsAround(height_m, near_m, far_m, _holds(cells, place, radius_m), (rows, columns))
 
 
 def _holds(cells: Cells, xy_m: F64, radius_m: float) -> bool:

@@ -94,6 +94,9 @@ def _judged(
     start_m, end_m = points_m[:-1], points_m[1:]
     distance_m, share = nearest_distances(pyramid, start_m, end_m)
     lowest_m, highest_m = height_range(pyramid, start_m, end_m)
+    if dsm.lowest_m is not None:  # heights that were raised would make the line seem lower above the ground
+        lowest = cells.with_elevation(np.ascontiguousarray(dsm.lowest_m))
+        _, highest_m = height_range(cells_pyramid(lowest), start_m, end_m)
     legs = _legs(line, distance_m, share, lowest_m)
     worst = _worst_point(dsm, line, distance_m, share)
     trend_places, trend_s_m = places_along(line.points_m, trend_step_m)

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from mapping.geometry.arrays import F64
 from planning.certificate.around import CellsAround, cells_around
 from planning.terrain.dsm import Dsm
 
@@ -50,7 +51,9 @@ def home_ground(
 ) -> HomeGround:
     """The ground around the projected place ``xy_m``.
 
-    ``stands_dsm_m``: the vehicle is known to stand so high, and only what rises above that is in its way.
+    ``stands_dsm_m``: the vehicle is known to stand so high, and only what rises above that is in its way. Where the
+    model's heights are raised for their error, what rises above the ground that they show there is, too.
+    Where several models meet, a step may be as large as they are apart.
     """
     reach_m, alt_m = centre_m + radius_m, float(dsm.elevation_at(np.array([xy_m]))[0])
     around = cells_around(dsm.cells, xy_m, reach_m)
@@ -59,18 +62,34 @@ def home_ground(
     reached = around.height_m[around.near_m <= reach_m]
     if not np.isfinite(reached).all():
         return _unknown(alt_m, reach_m, f"the surface model has unknown cells within {reach_m:.2f} m")
-    if stands_dsm_m is None:
-        lattice = dsm.cells.layout.lattice
-        sides = (float(lattice.height_m), float(lattice.width_m), float(lattice.shear_m))
-        steep = _steep(around.height_m, around.near_m, *sides, centre_m, reach_m, radius_m)
-        words, on_top = _obstacle(around, alt_m, *steep)
-    else:
-        words, on_top = _risen(around, reach_m, stands_dsm_m), False
-    low_m = float(reached.min())
-    if dsm.lowest_m is not None:
-        standing = cells_around(dsm.standing_cells, xy_m, reach_m)
-        low_m = min(low_m, float(np.nanmin(standing.height_m[standing.near_m <= reach_m])))
+    lowest_m = around.height_m if dsm.lowest_m is None else dsm.lowest_m[around.block].astype(np.float64)
+    words, on_top = None, False
+    if stands_dsm_m is not None:
+        words = _risen(around, reach_m, stands_dsm_m)
+    if stands_dsm_m is None or (words is not None and dsm.lowest_m is not None):
+        words, on_top = _uneven(dsm, around, lowest_m, alt_m, centre_m, radius_m)
+        if words is None and stands_dsm_m is not None:
+            gap_m = float((around.height_m - lowest_m)[around.near_m <= 0.0].min())
+            words = _risen(around, reach_m, stands_dsm_m + gap_m)
+    low_m = float(lowest_m[around.near_m <= reach_m].min())
     return HomeGround(alt_m, low_m, float(reached.max()), reach_m, words, on_top)
+
+
+def _uneven(
+    dsm: Dsm, around: CellsAround, lowest_m: F64, alt_m: float, centre_m: float, radius_m: float
+) -> tuple[str | None, bool]:
+    """What is too steep around a place, in words, and whether the place lies on top of it."""
+    lattice, reach_m = dsm.cells.layout.lattice, centre_m + radius_m
+    sides = (float(lattice.height_m), float(lattice.width_m), float(lattice.shear_m))
+    highest_m, near_m = around.height_m, around.near_m
+    steep = _steep(highest_m, highest_m, near_m, *sides, centre_m, reach_m, radius_m)
+    words, on_top = _obstacle(around, alt_m, *steep)
+    if words is None and dsm.seam is not None and (seam := dsm.seam[around.block] & (near_m <= reach_m)).any():
+        ends = highest_m, np.where(seam, lowest_m, highest_m)
+        high_m, low_m = _steep(*ends, near_m, *sides, centre_m, reach_m, radius_m)
+        if high_m > low_m:
+            words = f"the surface models that meet here leave {high_m - low_m:.1f} m open, their errors included"
+    return words, on_top
 
 
 def _unknown(alt_m: float, reach_m: float, words: str) -> HomeGround:
@@ -118,45 +137,48 @@ def gap_m(rows, cols, high, wide, lean):
 
 
 @njit(cache=True, nogil=True)
-def _tile_ranges(cells, near_m, reach_m, tile):
+def _tile_ranges(tops, feet, near_m, reach_m, tile):
     """Highest and lowest reached cell of each square of ``tile`` cells; -inf and inf where none is reached."""
-    shape = ((cells.shape[0] + tile - 1) // tile, (cells.shape[1] + tile - 1) // tile)
+    shape = ((tops.shape[0] + tile - 1) // tile, (tops.shape[1] + tile - 1) // tile)
     high, low = np.full(shape, -np.inf), np.full(shape, np.inf)
-    for r in range(cells.shape[0]):
-        for c in range(cells.shape[1]):
+    for r in range(tops.shape[0]):
+        for c in range(tops.shape[1]):
             if near_m[r, c] <= reach_m:
                 i, j = r // tile, c // tile
-                high[i, j] = max(high[i, j], cells[r, c])
-                low[i, j] = min(low[i, j], cells[r, c])
+                high[i, j] = max(high[i, j], tops[r, c])
+                low[i, j] = min(low[i, j], feet[r, c])
     return high, low
 
 
 @njit(cache=True, nogil=True)
-def _steep_between(cells, near_m, tall, wide, lean, centre_m, reach_m, radius_m, tile, i, j, p, q, high, low):
-    """Highest and lowest cell of the pairs too steep, the first in tile (i, j), the second in (p, q)."""
-    for r in range(i * tile, min(cells.shape[0], (i + 1) * tile)):
-        for c in range(j * tile, min(cells.shape[1], (j + 1) * tile)):
+def _steep_between(tops, feet, near_m, tall, wide, lean, centre_m, reach_m, radius_m, tile, i, j, p, q, high, low):
+    """Highest top and lowest foot of the pairs too steep, the first in tile (i, j), the second in (p, q)."""
+    for r in range(i * tile, min(tops.shape[0], (i + 1) * tile)):
+        for c in range(j * tile, min(tops.shape[1], (j + 1) * tile)):
             if near_m[r, c] > centre_m:
                 continue
-            for s in range(p * tile, min(cells.shape[0], (p + 1) * tile)):
-                for d in range(q * tile, min(cells.shape[1], (q + 1) * tile)):
+            for s in range(p * tile, min(tops.shape[0], (p + 1) * tile)):
+                for d in range(q * tile, min(tops.shape[1], (q + 1) * tile)):
                     if near_m[s, d] > reach_m or gap_m(s - r, d - c, tall, wide, lean) > radius_m:
                         continue
-                    a, b = np.float64(cells[r, c]), np.float64(cells[s, d])
-                    if abs(b - a) > free_step_m(s - r, d - c, tall, wide, lean):
-                        high, low = max(high, max(a, b)), min(low, min(a, b))
+                    free = free_step_m(s - r, d - c, tall, wide, lean)
+                    if tops[s, d] - feet[r, c] > free:
+                        high, low = max(high, tops[s, d]), min(low, feet[r, c])
+                    if tops[r, c] - feet[s, d] > free:
+                        high, low = max(high, tops[r, c]), min(low, feet[s, d])
     return high, low
 
 
 @njit(cache=True, nogil=True)
-def _steep(cells, near_m, tall, wide, lean, centre_m, reach_m, radius_m):
-    """Highest and lowest cell of all pairs that are too steep; (-inf, inf) when there is none.
+def _steep(tops, feet, near_m, tall, wide, lean, centre_m, reach_m, radius_m):
+    """Highest top and lowest foot of all pairs of cells that are too steep; (-inf, inf) when there is none.
 
+    A cell's surface lies between its foot and its top, which are the same where one model alone tells it.
     Squares of cells that differ by no more than is free anyway are passed over together.
     """
     side = min(tall, wide)
     tile = max(1, int(radius_m / side / _TILES_PER_RADIUS))
-    tile_high, tile_low = _tile_ranges(cells, near_m, reach_m, tile)
+    tile_high, tile_low = _tile_ranges(tops, feet, near_m, reach_m, tile)
     leaning_m = (radius_m / tall + 2.0) * abs(lean)
     around = math.ceil((radius_m + leaning_m) / (tile * side)) + 1
     high, low = -np.inf, np.inf
@@ -167,6 +189,7 @@ def _steep(cells, near_m, tall, wide, lean, centre_m, reach_m, radius_m):
                     most = max(tile_high[p, q] - tile_low[i, j], tile_high[i, j] - tile_low[p, q])
                     if most > FREE_STEP_M:
                         high, low = _steep_between(
-                            cells, near_m, tall, wide, lean, centre_m, reach_m, radius_m, tile, i, j, p, q, high, low
-                        )
+                            tops, feet, near_m, tall, wide, lean, centre_m, reach_m, radius_m, tile, i, j, p, q,
+                            high, low,
+                        )  # fmt: skip
     return high, low

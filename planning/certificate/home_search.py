@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from mapping.geometry.arrays import F32, F64, I64, Bools
-from planning.certificate.home_ground import HomeGround, free_step_m, gap_m, home_ground
+from planning.certificate.home_ground import FREE_STEP_M, HomeGround, free_step_m, gap_m, home_ground
 from planning.terrain.dsm import Dsm, SurfaceModel
 
 SEARCHES_M = ((12.0, 0.1), (50.0, 0.2), (150.0, 0.4))
@@ -122,7 +122,7 @@ def _grid(dsm: Dsm, xy_m: tuple[float, float], half_m: float, block_m: float) ->
     row1, col1 = row0 + (row1 - row0) // block * block, col0 + (col1 - col0) // block * block
     if row1 <= row0 or col1 <= col0:
         return None
-    cells = dsm.elevation_m[row0:row1, col0:col1]
+    cells = dsm.settled(FREE_STEP_M).elevation_m[row0:row1, col0:col1]
     blocks = cells.reshape((row1 - row0) // block, block, (col1 - col0) // block, block)
     return _Grid(
         high_m=np.ascontiguousarray(blocks.max(axis=(1, 3))),

@@ -20,6 +20,8 @@ from planning.terrain.dsm import Dsm
 
 FINEST_M = UwbGeometry().bin_m
 """Resolution where nobody asks for another, or the model's own where that is coarser: the radar's range bins."""
+APART_M = 0.5
+"""Where models meet that are farther apart, errors included, nothing is known of the steps between them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +61,7 @@ def traversable_ground(
     """
     if resolution_m is not None and not (math.isfinite(resolution_m) and resolution_m > 0.0):
         raise ParameterError(f"A resolution of {resolution_m:g} m makes no sense.", advice="Give metres above 0.")
+    dsm = dsm.settled(APART_M)
     wanted_m = resolution_m or max(FINEST_M, dsm.resolution_m * math.sqrt(dsm.elevation_m.size / MOST_CELLS))
     together = max(1, math.floor(wanted_m / dsm.resolution_m * (1.0 + 1e-6)))
     if resolution_m is None:

@@ -11,7 +11,7 @@ import numpy as np
 from affine import Affine
 from pyproj import CRS, Proj, Transformer
 
-from mapping.geometry.arrays import F32, F64
+from mapping.geometry.arrays import F32, F64, Bools
 from planning.errors import ParameterError
 from planning.terrain.cells.cells import Cells, square_cells
 from planning.terrain.cells.squares import squares
@@ -122,6 +122,8 @@ class Dsm(SurfaceModel):
     """Of its file; empty when nobody gave it one."""
     lowest_m: F32 | None = None
     """(H, W) how low a vehicle may stand on each cell; None: on its elevation."""
+    seam: Bools | None = None
+    """(H, W) where the surface between both is not known, for several models meet; None: nowhere."""
     rms_m: float | None = None
 
     def __post_init__(self) -> None:
@@ -133,8 +135,11 @@ class Dsm(SurfaceModel):
         if not (t.a > 0 and np.isclose(t.a, -t.e, rtol=1e-6) and t.b == 0 and t.d == 0):
             raise ParameterError(f"A surface model's cells must be square and north up, got {tuple(t)[:6]}.")
         self.elevation_m.flags.writeable = False
-        if self.lowest_m is not None and self.lowest_m.shape != self.elevation_m.shape:
-            raise ParameterError(f"Lowest heights are {self.lowest_m.shape}, not {self.elevation_m.shape}.")
+        if (self.lowest_m is None) != (self.seam is None):
+            raise ParameterError("Of a surface model of several the lowest heights and the seams are given together.")
+        for name, beside in (("Lowest heights", self.lowest_m), ("Seams", self.seam)):
+            if beside is not None and (beside.shape != self.elevation_m.shape or self.source is not None):
+                raise ParameterError(f"{name} are {beside.shape}, the grid's own cells {self.elevation_m.shape}.")
 
     @property
     def height_px(self) -> int:
@@ -151,13 +156,6 @@ class Dsm(SurfaceModel):
             return self.source
         return square_cells(self.elevation_m, self.resolution_m, (self.transform.c, self.transform.f))
 
-    @property
-    def standing_cells(self) -> Cells:
-        """How low a vehicle may stand on them."""
-        if self.lowest_m is None:
-            return self.cells
-        return square_cells(self.lowest_m, self.resolution_m, (self.transform.c, self.transform.f))
-
     def elevation_at(self, xy_m: F64) -> F64:
         if self.source is not None:
             return self.source.elevation_at(xy_m)
@@ -169,18 +167,36 @@ class Dsm(SurfaceModel):
 
     def with_elevation(self, elevation_m: F32) -> Dsm:
         """The same grid and provenance with other heights (same shape), which are nobody's measured cells."""
-        return replace(self, elevation_m=elevation_m, source=None, lowest_m=None)
+        return replace(self, elevation_m=elevation_m, source=None, lowest_m=None, seam=None)
 
     def as_grid(self) -> Dsm:
         """The grid alone, for what is nowhere to be lower than the surface but need not be exact."""
-        return self if self.source is None and self.lowest_m is None else replace(self, source=None, lowest_m=None)
+        if self.source is None and self.lowest_m is None:
+            return self
+        return replace(self, source=None, lowest_m=None, seam=None)
+
+    def settled(self, apart_m: float) -> Dsm:
+        """Unknown where models that meet are farther apart, errors included: a step between them is in none of them."""
+        if self.lowest_m is None or self.seam is None:
+            return self
+        apart = self.seam & (self.elevation_m - self.lowest_m > apart_m)
+        return self.with_elevation(np.where(apart, np.float32(np.nan), self.elevation_m))
 
     def with_cells(self, elevation_m: F32) -> Dsm:
-        """The same model with other heights of its ``cells``; the grid follows them."""
+        """The same model with other heights of its ``cells``; the grid follows them.
+
+        A cell that is cut down is cut down at both ends; one that is raised may be as low as before.
+        """
         if self.source is None:
-            return replace(self, elevation_m=elevation_m)
+            return replace(self, elevation_m=elevation_m, lowest_m=self._lowest_under(elevation_m))
         source = self.source.with_elevation(elevation_m)
         return replace(self, source=source, elevation_m=squares(source, self.transform, self.elevation_m.shape))
+
+    def _lowest_under(self, elevation_m: F32) -> F32 | None:
+        if self.lowest_m is None:
+            return None
+        cut_m = np.fmax(self.elevation_m - elevation_m, np.float32(0.0))
+        return np.where(np.isnan(self.elevation_m), elevation_m, self.lowest_m - cut_m)
 
     def whole(self) -> Dsm:
         return self
@@ -195,9 +211,14 @@ class Dsm(SurfaceModel):
         if source is not None:
             low, high = transform @ (0, r1 - r0), transform @ (c1 - c0, 0)
             source = source.around(np.array(low), np.array(high))
-        lowest_m = None if self.lowest_m is None else self.lowest_m[r0:r1, c0:c1]
+        part = slice(r0, r1), slice(c0, c1)
         return replace(
-            self, elevation_m=self.elevation_m[r0:r1, c0:c1], transform=transform, source=source, lowest_m=lowest_m
+            self,
+            elevation_m=self.elevation_m[part],
+            transform=transform,
+            source=source,
+            lowest_m=None if self.lowest_m is None else self.lowest_m[part],
+            seam=None if self.seam is None else self.seam[part],
         )
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from affine import Affine
-from scipy.ndimage import maximum_filter1d
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from mapping.geometry.arrays import F32, Bools
 from planning.terrain.catalogue.models import CatalogueModel
@@ -49,7 +49,7 @@ class Surface:
     best: np.ndarray
     """uint8: which layer is the best; ``NO_MODEL`` where none is."""
     seam: Bools
-    """Where more than one model counts."""
+    """Where more than one model counts, or another one begins near: steps between them are in none of them."""
 
     def part(self, rows: slice, columns: slice) -> Surface:
         cut = (rows, columns)
@@ -107,7 +107,7 @@ def surface_of(
         np.fmin(low_m[rows, columns], touched.low_m - np.float32(layer.drop_m), out=low_m[rows, columns], where=counts)
     unknown = best == NO_MODEL
     high_m[unknown] = low_m[unknown] = np.nan
-    return Surface(high_m, low_m, best, seam & ~unknown)
+    return Surface(high_m, low_m, best, (seam | _near_another(best, transform.a)) & ~unknown)
 
 
 def _counting(layers: Sequence[Layer], number: int, best: np.ndarray, cell_m: float) -> Bools:
@@ -117,17 +117,29 @@ def _counting(layers: Sequence[Layer], number: int, best: np.ndarray, cell_m: fl
         return counts
     for better in np.unique(best[best < number]).tolist():
         px = math.ceil(seam_m(layers[number].model, layers[better].model) / cell_m) + 1
-        counts |= (best == better) & _grown(mine, px)
+        counts |= (best == better) & (_grown(mine, px) > 0)
     return counts
 
 
-def _grown(mask: Bools, px: int) -> Bools:
-    """Within a square of so many cells around: it holds the disc."""
-    grown = mask.astype(np.uint8)
+def _near_another(best: np.ndarray, cell_m: float) -> Bools:
+    """Where two models are the best within ``SEAM_M``, whether or not they overlap."""
+    px = math.ceil(SEAM_M / cell_m) + 1
+    last, first = _grown(np.where(best == NO_MODEL, np.uint8(0), best), px), best
     for axis in (0, 1):
-        size = min(2 * px + 1, 2 * mask.shape[axis] + 1)
-        grown = maximum_filter1d(grown, size, axis=axis, mode="constant", cval=0)
-    return grown.astype(np.bool_)
+        first = minimum_filter1d(first, _width(px, best.shape[axis]), axis=axis, mode="constant", cval=NO_MODEL)
+    return last > first
+
+
+def _grown(values: np.ndarray, px: int) -> np.ndarray:
+    """The largest within a square of so many cells around: it holds the disc."""
+    grown = values.astype(np.uint8)
+    for axis in (0, 1):
+        grown = maximum_filter1d(grown, _width(px, values.shape[axis]), axis=axis, mode="constant", cval=0)
+    return grown
+
+
+def _width(px: int, count: int) -> int:
+    return min(2 * px + 1, 2 * count + 1)
 
 
 def _touched(model: CatalogueModel, transform: Affine, shape: tuple[int, int]) -> tuple[slice, slice, Touched] | None:

@@ -105,7 +105,8 @@ class Catalogue(SurfaceModel):
             self.vertical_datum,
             self.sha256,
             name=self.name,
-            lowest_m=found.lowest_m,
+            lowest_m=np.ascontiguousarray(found.lowest_m),
+            seam=np.ascontiguousarray(found.seam),
             rms_m=self.rms_m,
         )
 

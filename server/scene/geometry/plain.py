@@ -27,7 +27,8 @@ def plain_ground(like: Dsm, points_m: F64) -> Dsm:
     cell_m = float((high - low).max()) / _CELLS
     columns, rows = (int(count) for count in np.ceil((high - low) / cell_m))
     level = np.full((rows, columns), like.elevation_m[0, 0], dtype=np.float32)
-    return replace(like, lowest_m=None, elevation_m=level, transform=Affine(cell_m, 0.0, low[0], 0.0, -cell_m, high[1]))
+    transform = Affine(cell_m, 0.0, low[0], 0.0, -cell_m, high[1])
+    return replace(like.as_grid(), elevation_m=level, transform=transform)
 
 
 def plain_around(lat_deg: float, lon_deg: float) -> Dsm:
