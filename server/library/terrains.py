@@ -21,7 +21,7 @@ from server.schemas import CloudDoc, PlaceDoc, SpikeDoc, TerrainDoc
 from telemetry.topics.obstacles import GroundNotice
 
 FOLDER = "terrains"
-_ELEVATION = "elevation.npy"
+_ELEVATION, _LOWEST, _SEAM = "elevation.npy", "lowest.npy", "seam.npy"
 _MAX_SPIKES = 100
 
 
@@ -46,6 +46,9 @@ class TerrainManifest(BaseModel):
     crs_wkt: str
     source: CellsManifest | None = None
     """Of the file's own cells, where they are no squares of the grid."""
+    of_several: bool = False
+    """Whether lowest heights and seams lie beside the heights."""
+    rms_m: float | None = None
 
 
 def store_terrain(
@@ -70,10 +73,14 @@ def store_terrain(
     doc = doc.model_copy(update={"cloud": cloud, "in_doubt": in_doubt})
     with new_directory(root / FOLDER / terrain_id) as folder:
         write_array(folder / _ELEVATION, dsm.elevation_m)
+        for file, beside in ((_LOWEST, dsm.lowest_m), (_SEAM, dsm.seam)):
+            if beside is not None:
+                write_array(folder / file, beside)
         fill(folder)
         source = write_cells(folder, dsm.source) if dsm.source else None
         transform = (t.a, t.b, t.c, t.d, t.e, t.f)
-        write_manifest(folder, TerrainManifest(doc=doc, transform=transform, crs_wkt=dsm.crs.to_wkt(), source=source))
+        manifest = TerrainManifest(doc=doc, transform=transform, crs_wkt=dsm.crs.to_wkt(), source=source)
+        write_manifest(folder, manifest.model_copy(update={"of_several": dsm.lowest_m is not None, "rms_m": dsm.rms_m}))
     return doc
 
 
@@ -89,6 +96,9 @@ def load_terrain(directory: Path) -> Dsm:
         sha256=manifest.doc.sha256,
         source=read_cells(directory, manifest.source) if manifest.source else None,
         name=manifest.doc.name,
+        lowest_m=read_array(directory / _LOWEST, shape=shape, dtype=np.float32) if manifest.of_several else None,
+        seam=read_array(directory / _SEAM, shape=shape, dtype=np.bool_) if manifest.of_several else None,
+        rms_m=manifest.rms_m,
     )
 
 

@@ -19,12 +19,15 @@ from telemetry.recording.mcap_files.reader import Recording
 NAME, MEDIA_TYPE = "known_ground.npz", "application/x-npz"
 MOST_BYTES = 2_000_000_000
 """Of heights: a file that says more of itself is not unpacked."""
+_BESIDE = ("lowest_m", "seam", "rms_m")
+"""Of a surface model of several; others have none of them."""
 _BROKEN = (ValueError, KeyError, OSError, EOFError, TypeError, zipfile.BadZipFile, zlib.error, CRSError, DescribedError)
 
 
 def packed(dsm: Dsm) -> bytes:
     """The grid as it is, to the last bit. Raises RecordingError when it is too large to be carried."""
-    if dsm.elevation_m.nbytes > MOST_BYTES:
+    beside = {name: value for name in _BESIDE if (value := getattr(dsm, name)) is not None}
+    if sum(array.nbytes for array in (dsm.elevation_m, dsm.lowest_m, dsm.seam) if array is not None) > MOST_BYTES:
         what = f"A surface model of {dsm.elevation_m.size:,} cells is too large for a recording."
         raise RecordingError(what, advice="Cut it to where the flight is, or leave the recording out.")
     out = io.BytesIO()
@@ -36,6 +39,7 @@ def packed(dsm: Dsm) -> bytes:
         vertical_datum=np.array(dsm.vertical_datum or ""),
         sha256=np.array(dsm.sha256),
         name=np.array(dsm.name),
+        **beside,
     )
     return out.getvalue()
 
@@ -64,4 +68,7 @@ def _unpacked(data: bytes) -> Dsm:
             vertical_datum=str(fields["vertical_datum"]) or None,
             sha256=str(fields["sha256"]),
             name=str(fields["name"]) if "name" in fields else "",
+            lowest_m=fields.get("lowest_m"),
+            seam=fields.get("seam"),
+            rms_m=float(fields["rms_m"]) if "rms_m" in fields else None,
         )

@@ -38,7 +38,7 @@ WORDS: dict[Kind, str] = {
 }
 ALLOWED: dict[Kind, re.Pattern[str]] = {
     "terrain": re.compile(
-        r"manifest\.json|elevation\.npy|cells\.npy|bend\.npy|points\.npy|point_colors\.npy|seen-[0-9a-z]{1,32}\.npz"
+        r"manifest\.json|(elevation|lowest|seam|cells|bend|points|point_colors)\.npy|seen-[0-9a-z]{1,32}\.npz"
     ),
     "orthophoto": re.compile(r"manifest\.json|pixels\.npy"),
     "radar": re.compile(r"manifest\.json|[0-9a-f]{16}\.(npy|bin|csv|cfg|json)"),
