@@ -29,7 +29,7 @@ from server.schemas import (
     TextMessage,
     VehicleMessage,
 )
-from server.schemas.account_docs import MeDoc
+from server.schemas.account_docs import MeDoc, RoleName
 from server.schemas.flight_docs import NodeDoc, OnboardDoc
 from server.schemas.obstacle_docs import AlertDoc, ManoeuvreDoc, ObstaclesState
 from server.schemas.station_docs import VehicleDoc
@@ -195,14 +195,15 @@ LOST = (
 )
 
 
-WHO: dict[str, tuple[MeMessage | LeaseMessage, ...]] = {
-    name: (MeMessage(me=MeDoc(name="Ann", role=role, owner=False)), LeaseMessage(lease=lease))
-    for name, role, lease in (
-        ("in-charge", "operator", LeaseDoc(holder="Ann", mine=True, silent=False)),
-        ("looking-on", "operator", LeaseDoc(holder="Owner ad42", mine=False, silent=True)),
-        ("nobody-in-charge", "operator", LeaseDoc(holder=None, mine=False, silent=False)),
-        ("observer", "observer", LeaseDoc(holder="Owner ad42", mine=False, silent=False)),
-    )
+def _who(role: RoleName, lease: LeaseDoc) -> tuple[MeMessage, LeaseMessage]:
+    return MeMessage(me=MeDoc(name="Ann", role=role, owner=False)), LeaseMessage(lease=lease)
+
+
+WHO = {
+    "in-charge": _who("operator", LeaseDoc(holder="Ann", mine=True, silent=False)),
+    "looking-on": _who("operator", LeaseDoc(holder="Owner ad42", mine=False, silent=True)),
+    "nobody-in-charge": _who("operator", LeaseDoc(holder=None, mine=False, silent=False)),
+    "observer": _who("observer", LeaseDoc(holder="Owner ad42", mine=False, silent=False)),
 }
 
 
