@@ -39,6 +39,7 @@ SAME_HOME_M = 0.3
 """A home that lies so near to the planned one's height is that one: the plan's heights are not moved for it either."""
 SAME_M = 0.005
 """Single precision, as vehicles keep it, differs by less."""
+TAKEN_WHEN_SWITCHED = "The fence is switched off and on again: since ArduPilot 4.6 it takes FENCE_TYPE only then."
 NO_FLOOR = "PX4 has no floor: the vehicle knows nothing of the plan's."
 
 
@@ -65,7 +66,7 @@ class HeightChanges:
     """What is to be written so that the vehicle keeps a plan's floor and ceiling, in this order."""
 
     changes: tuple[HeightChange, ...]
-    """None where all is so already. The fence is switched on last."""
+    """None where all is so already. The fence is switched on last, off before where it takes its kinds only then."""
     notes: tuple[str, ...]
     """What this means besides, in whole sentences."""
 
@@ -156,10 +157,14 @@ def _ardupilot(
     if floor_m is not None:
         wanted.append(HeightChange("FENCE_ALT_MIN", _told(parameters, "FENCE_ALT_MIN"), floor_m, "m"))
     wanted.append(HeightChange("FENCE_TYPE", kinds_before, kinds))
-    wanted.append(HeightChange("FENCE_ENABLE", _told(parameters, "FENCE_ENABLE"), 1))
+    enabled, notes = _told(parameters, "FENCE_ENABLE"), list[str]()
+    if enabled == 1 and kinds & ~kinds_before & ~FLOOR_BIT:
+        wanted.append(HeightChange("FENCE_ENABLE", enabled, 0))
+        enabled = 0.0
+        notes.append(TAKEN_WHEN_SWITCHED)
+    wanted.append(HeightChange("FENCE_ENABLE", enabled, 1))
     margin_m = _margin_m(parameters)
     _refuse_unarmable(floor_m, ceiling_m, margin_m, parameters)
-    notes = []
     if kinds_before & CIRCLE_BIT and not kinds & CIRCLE_BIT:
         radius_m = parameters.get("FENCE_RADIUS")
         size = "" if radius_m is None else f", {radius_m:g} m"

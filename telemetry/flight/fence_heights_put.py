@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Sequence
+from dataclasses import replace
 
 from telemetry.errors import NotAllowedError, SilentError, TelemetryError
 from telemetry.flight.fence_heights import HeightChange, HeightChanges
@@ -11,6 +13,9 @@ from telemetry.topics.parameters import Outcome, ParameterChange, ParameterWritt
 from telemetry.topics.requests import Operator, WriteParameters
 
 UNSET = "Floor or ceiling did not take: the fence was not switched."
+STAYS_OFF = "The fence may be off now: set FENCE_ENABLE to 1 under Parameters."
+OFF_FOR_S = 0.3
+"""ArduPilot looks ten times a second whether its fence was switched."""
 
 
 async def put_heights(link: Asks, operator: Operator, found: HeightChanges) -> tuple[ParameterWritten, ...]:
@@ -25,12 +30,41 @@ async def put_heights(link: Asks, operator: Operator, found: HeightChanges) -> t
         return written
     if not all(one.took for one in written):
         return (*written, *_left(switches, "not sent", UNSET))
+    off = ("FENCE_ENABLE", 0)
+    cut = next((number for number, each in enumerate(switches) if (each.name, each.after) == off), None)
     try:
-        return (*written, *await _write(link, operator, switches))
+        if cut is None:
+            return (*written, *await _write(link, operator, switches))
+        return (*written, *await _off_and_on(link, operator, switches[: cut + 1], switches[cut + 1 :]))
     except TelemetryError as error:
         if not written:
             raise
         return (*written, *lost(switches, error))
+
+
+async def _off_and_on(
+    link: Asks, operator: Operator, off: Sequence[HeightChange], on: Sequence[HeightChange]
+) -> tuple[ParameterWritten, ...]:
+    """``off``: up to where it is switched off. Whatever becomes of that, it is switched on: perhaps it is off."""
+    try:
+        written = await _write(link, operator, off)
+        await asyncio.sleep(OFF_FOR_S)
+    except NotAllowedError:
+        raise
+    except TelemetryError as error:
+        written = lost(off, error)
+    except asyncio.CancelledError:
+        await _on_again(link, operator, on)
+        raise
+    return (*written, *await _on_again(link, operator, on))
+
+
+async def _on_again(link: Asks, operator: Operator, on: Sequence[HeightChange]) -> tuple[ParameterWritten, ...]:
+    try:
+        written = await _write(link, operator, on)
+    except TelemetryError as error:
+        written = lost(on, error)
+    return tuple(one if one.took else replace(one, words=f"{one.words} {STAYS_OFF}".strip()) for one in written)
 
 
 def lost(changes: Sequence[HeightChange], error: TelemetryError) -> tuple[ParameterWritten, ...]:

@@ -11,8 +11,9 @@ import pytest
 from server.errors import ConflictError
 from server.flying.uploading.fence_heights_desk import NOT_CHECKED, FenceHeights
 from server.schemas import FenceDoc, PlanDoc, SetFenceHeights
-from telemetry.errors import NotAllowedError, NoVehicleError, SilentError
-from telemetry.flight.fence_heights_put import UNSET
+from telemetry.errors import NotAllowedError, NoVehicleError, RefusedError, SilentError
+from telemetry.flight.fence_heights import TAKEN_WHEN_SWITCHED
+from telemetry.flight.fence_heights_put import STAYS_OFF, UNSET
 from telemetry.topics.parameters import ParameterWritten
 from telemetry.topics.requests import Operator, ReadParameters, WriteParameters
 
@@ -29,12 +30,17 @@ class Link:
         }  # fmt: skip
         self.keeps: set[str] = set()
         self.fails: dict[str, Exception] = {}
+        self.breaks_after_off = False
+        self.took: list[tuple[str, float]] = []
 
     async def call(self, request: Any) -> Any:
         if isinstance(request, ReadParameters):
             return {name: self.held.get(name) for name in request.names}
         assert isinstance(request, WriteParameters)
         assert not request.even_armed
+        assert len({change.name for change in request.changes}) == len(request.changes)
+        if self.breaks_after_off and self.held["FENCE_ENABLE"] == 0.0:
+            raise SilentError("The vehicle is silent.", advice="Check the link.")
         for change in request.changes:
             if (error := self.fails.get(change.name)) is not None:
                 raise error
@@ -45,6 +51,7 @@ class Link:
         if name in self.keeps:
             return ParameterWritten(name, value, before, before, "kept", "It keeps the old value.")
         self.held[name] = value
+        self.took.append((name, value))
         return ParameterWritten(name, value, before, value, "set")
 
 
@@ -126,6 +133,32 @@ def test_a_link_that_fails_in_between_is_told_with_what_was_set() -> None:
         with pytest.raises(NotAllowedError, match="armed"):  # nothing at all was written
             await bench.desk.set(ME, SetFenceHeights(changes=(await bench.desk.look()).changes))
         assert len(bench.told) == 2
+
+    run(play())
+
+
+def test_a_fence_that_is_on_is_switched_off_and_on_and_comes_on_whatever_fails_before() -> None:
+    async def play() -> None:
+        bench = Bench(floor_m=None)
+        bench.link.held |= {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0}
+        shown = await bench.desk.look()
+        assert TAKEN_WHEN_SWITCHED in shown.notes
+        assert (await bench.desk.set(ME, SetFenceHeights(changes=shown.changes))).took
+        assert bench.link.took[1:] == [("FENCE_TYPE", 5.0), ("FENCE_ENABLE", 0.0), ("FENCE_ENABLE", 1.0)]
+        bench.link.held |= {"FENCE_TYPE": 4.0, "FENCE_ALT_MAX": 100.0}
+        bench.link.took.clear()
+        bench.link.fails = {"FENCE_TYPE": RefusedError("No answer.", advice="Look.")}
+        shown = await bench.desk.look()
+        done = await bench.desk.set(ME, SetFenceHeights(changes=shown.changes))
+        assert [one.outcome for one in done.written] == ["set", "unknown", "unknown", "set"]
+        assert bench.link.took[-1] == ("FENCE_ENABLE", 1.0)
+
+        bench.link.held |= {"FENCE_TYPE": 4.0, "FENCE_ALT_MAX": 100.0}
+        bench.link.fails, shown = {}, await bench.desk.look()
+        bench.link.breaks_after_off = True
+        done = await bench.desk.set(ME, SetFenceHeights(changes=shown.changes))
+        assert not done.took
+        assert STAYS_OFF in done.written[-1].words
 
     run(play())
 

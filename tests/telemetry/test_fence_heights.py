@@ -13,6 +13,7 @@ from planning.fence.fence_model import NO_FENCE, Fence, circle
 from telemetry.errors import NotAllowedError
 from telemetry.flight.fence_heights import (
     SAME_HOME_M,
+    TAKEN_WHEN_SWITCHED,
     HeightChanges,
     height_changes,
     heights_aboard,
@@ -53,6 +54,15 @@ def test_what_acts_already_goes_on_to_act(on: dict[str, float]) -> None:
     made = height_changes(BOTH, COPTER | on, "ardupilot")
     assert "FENCE_TYPE 7 -> 15" in words(made)
     assert "stays off" not in " ".join(made.notes)
+
+
+@pytest.mark.parametrize(("kinds", "is_anew"), [(4.0, True), (8.0, True), (1.0, False), (7.0, False)])
+def test_a_fence_that_is_on_is_switched_anew_where_it_gains_a_kind_that_it_takes_only_then(kinds, is_anew) -> None:
+    """The floor is taken by itself, after each take-off."""
+    made = height_changes(BOTH, COPTER | {"FENCE_ENABLE": 1.0, "FENCE_TYPE": kinds}, "ardupilot")
+    switched = ["FENCE_ENABLE 1 -> 0", "FENCE_ENABLE 0 -> 1"] if is_anew else []
+    assert [each for each in words(made) if "ENABLE" in each] == switched
+    assert (TAKEN_WHEN_SWITCHED in made.notes) is is_anew
 
 
 def test_shapes_of_the_plan_act_too_once_it_is_switched_on() -> None:

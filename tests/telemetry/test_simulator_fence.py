@@ -21,7 +21,8 @@ from telemetry.simulation.simulator.autopilot.copter_fence import CopterFence, F
 from telemetry.simulation.simulator.autopilot.fence_shapes import FencePart, allowed
 from telemetry.simulation.simulator.autopilot.personality import PERSONALITIES
 from telemetry.simulation.simulator.autopilot.px4.px4_fence import Px4Fence, Px4FenceNews
-from telemetry.topics.requests import Land, ReadParameters, ReturnHome, StartAuto, UploadPlaces
+from telemetry.topics.parameters import ParameterChange
+from telemetry.topics.requests import Land, ReadParameters, ReturnHome, StartAuto, UploadPlaces, WriteParameters
 from tests.telemetry.link_bench import ME, Console, until
 from tests.telemetry.own_time import run
 from tests.telemetry.simulator_bench import HOME, Bench
@@ -78,6 +79,16 @@ def test_a_copter_names_all_that_it_crosses_and_only_what_its_type_says() -> Non
     copter.parameters.set("FENCE_TYPE", 7)
     copter.parameters.set("FENCE_ENABLE", 0)
     assert copter.at(40, 25) == FenceNews()
+
+
+def test_a_copter_takes_new_kinds_only_when_its_fence_is_switched_on() -> None:
+    copter = Copter(FENCE_TYPE=4, FENCE_ALT_MAX=20)
+    copter.parameters.set("FENCE_TYPE", 5)
+    assert copter.at(0, 25) == FenceNews()
+    copter.parameters.set("FENCE_ENABLE", 0)
+    assert copter.at(0, 25) == FenceNews()
+    copter.parameters.set("FENCE_ENABLE", 1)
+    assert copter.at(0, 25).texts == ("Max Alt fence breached",)
 
 
 def test_the_floor_comes_on_above_it_by_the_margin_and_is_off_while_it_lands() -> None:
@@ -199,7 +210,9 @@ def test_a_copter_does_at_its_ceiling_and_its_shapes_what_the_page_says() -> Non
             report = await upload(bench, items(8))
             wide = Fence(circles=(circle(LAT_DEG, LON_DEG, 500.0, inclusion=True, where="t"),))
             assert (await bench.handle(UploadPlaces(ME, "fence", wire_items(fence_items(wide))))).verified
-            held = await put(bench, 16.0, "ardupilot")
+            shapes_alone = (ParameterChange("FENCE_TYPE", 4), ParameterChange("FENCE_ENABLE", 1))
+            await bench.handle(WriteParameters(ME, shapes_alone))
+            held = await put(bench, 16.0, "ardupilot")  # a kind that a fence that is on does not take by itself
             assert at_fence(held, "ardupilot").startswith("At its fence the vehicle returns")
             await start(bench, StartAuto(ME, report.onboard.digest))
             await until(lambda: bench.state.fence_breach == "ceiling")

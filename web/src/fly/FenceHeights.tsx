@@ -29,7 +29,7 @@ function Shown({ doc }: { doc: FenceHeightsDoc }) {
         <table class="rounded" data-testid="heights-changes">
           <tbody>
             {doc.changes.map((change) => (
-              <tr key={change.name}>
+              <tr key={`${change.name} ${change.after}`}>
                 <th scope="row">{change.name}</th>
                 <td>{changeWords(change)}</td>
               </tr>

@@ -17,7 +17,7 @@ export function WrittenList({ written, testid }: { written: readonly WrittenDoc[
   return (
     <ul class="written" role="status" data-testid={testid}>
       {written.map((one) => (
-        <li key={one.name} class={one.took ? "took" : "missed"} data-outcome={one.outcome}>
+        <li key={`${one.name} ${one.asked}`} class={one.took ? "took" : "missed"} data-outcome={one.outcome}>
           <Icon name={one.took ? "check" : "warning"} size={16} />
           <span>
             <strong>{one.name}</strong> {one.before ?? "?"} → {one.asked}: {OUTCOMES[one.outcome]}

@@ -1,5 +1,6 @@
 """The simulated ArduCopter's fence, as AC_Fence of 4.6 and 4.7 does it: what is beyond, what is said, what is done.
 
+Which kinds act it takes from FENCE_TYPE when it is switched on; those that are taken from FENCE_TYPE later act no more.
 It acts on where the vehicle is, at the limit itself: its margin counts for the return height, for the floor and when
 it arms. Stopping before a fence (AVOID_ENABLE) is not simulated.
 """
@@ -42,6 +43,7 @@ class CopterFence:
         self.breached = self.count = 0
         self.breached_s = 0.0
         self._floor_on = False
+        self._was_on, self._taken = self.is_on, self._kinds_told() if self.is_on else 0
         self._checked_s = -math.inf
         self._beyond_m: dict[int, float] = {}
         self._backup_m: dict[int, float] = {}
@@ -81,6 +83,8 @@ class CopterFence:
         if now_s - self._checked_s < CHECK_S:
             return NOTHING
         self._checked_s = now_s
+        if self.is_on != self._was_on:
+            self._was_on, self._taken = self.is_on, self._kinds_told() if self.is_on else 0
         texts = self._switch_floor(p_neu[2] - home_neu[2], landing=landing)
         was = self.breached
         new = self._look(p_neu, home_neu, now_s)
@@ -96,9 +100,12 @@ class CopterFence:
         """That act now."""
         if not self.is_on:
             return 0
-        kinds = int(self._parameters["FENCE_TYPE"])
+        kinds = self._kinds_told() & (self._taken | FLOOR)
         kinds &= ~(0 if self.parts else SHAPES)
         return kinds if self._floor_on else kinds & ~FLOOR
+
+    def _kinds_told(self) -> int:
+        return int(self._parameters["FENCE_TYPE"])
 
     def _switch_floor(self, alt_m: float, *, landing: bool) -> list[str]:
         """It comes on once the vehicle is above it by the margin, and is off while it lands."""
