@@ -21,6 +21,7 @@ from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.holes import fill_holes
 from telemetry.errors import NotAllowedError
 from telemetry.flight.fence_heights import heights_aboard
+from telemetry.flight.fence_radius import circle_aboard
 from telemetry.flight.guided.handover import is_fresh
 from telemetry.flight.guided.script_targets import bearing_rad
 from telemetry.flight.home_watch import home_of
@@ -51,14 +52,15 @@ class Flown:
     """So much above the ground home may lie, or below it: ``telemetry.flight.home_height``."""
 
     def kept_fence(self, state: VehicleState) -> Fence:
-        """With the floor and ceiling at which the vehicle acts by its own settings."""
-        return within_both(self.fence, heights_aboard(self.parameters, _firmware(state)))
+        """With the floor, the ceiling and the circle around home at which the vehicle acts by its own settings."""
+        home, firmware = actual_home(state, None), _firmware(state)
+        around = circle_aboard(self.parameters, firmware, None if home is None else (home.lat_deg, home.lon_deg))
+        return within_both(within_both(self.fence, heights_aboard(self.parameters, firmware)), around)
 
     def fence_of_way(self, state: VehicleState) -> Fence:
         """Without the vehicle's own floor: a way begins where the vehicle is, also below it after a take-off, where it
         does not act yet."""
-        ceiling_m = self.kept_fence(state).ceiling_rel_home_m
-        return replace(self.fence, ceiling_rel_home_m=ceiling_m)
+        return replace(self.kept_fence(state), floor_rel_home_m=self.fence.floor_rel_home_m)
 
 
 def here_of(state: VehicleState, wish: Wish, now_s: float) -> Here:

@@ -77,6 +77,9 @@ def test_the_vehicles_own_ceiling_is_kept_and_its_floor_stops_no_climb_from_belo
     assert way.problem == "way"
     assert "ceiling is at 30 m" in " ".join(way.reasons)
     assert judged(GoTo(30.0), acts | {"FENCE_ALT_MAX": 30.0, "FENCE_ENABLE": 0.0}).problem is None
+    around = acts | {"FENCE_TYPE": 2.0, "FENCE_RADIUS": 900.0}
+    assert judged(GoTo(30.0), around).problem is None
+    assert judged(GoTo(30.0), around | {"FENCE_RADIUS": 1.0}).problem == "way"
 
 
 @pytest.mark.parametrize("missing", ["home_lat_deg", "home_lon_deg", "home_alt_amsl_m"])

@@ -224,6 +224,25 @@ def test_a_return_height_that_is_not_enough() -> None:
     assert checked(flown=below).ok()
 
 
+@pytest.mark.parametrize(
+    ("acts", "firmware", "name"),
+    [
+        ({"FENCE_ENABLE": 1.0, "FENCE_TYPE": 2.0}, "ardupilot", "FENCE_RADIUS"),
+        ({"GF_ACTION": 2.0, "GF_MAX_VER_DIST": 0.0}, "px4", "GF_MAX_HOR_DIST"),
+    ],
+)
+def test_a_circle_around_home_on_board_that_the_flight_would_leave_is_found(acts, firmware, name) -> None:
+    wide = checked(parameters=PARAMETERS | acts | {name: 900.0}, firmware=firmware)
+    assert row(wide, "clearance").state == "good"
+    near = checked(parameters=PARAMETERS | acts | {name: 5.0}, firmware=firmware)
+    assert row(near, "clearance").state == "bad"
+    assert "leaves inclusion circle 1" in row(near, "clearance").text
+    off = {"FENCE_ENABLE": 0.0, "GF_ACTION": 0.0}
+    assert (
+        row(checked(parameters=PARAMETERS | acts | {name: 5.0} | off, firmware=firmware), "clearance").state == "good"
+    )
+
+
 def test_a_ceiling_on_board_that_the_flight_or_its_return_would_not_keep_is_found() -> None:
     acts = PARAMETERS | {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 1.0, "FENCE_ALT_MAX": 12.0, "FENCE_MARGIN": 2.0}
     low = checked(parameters=acts)

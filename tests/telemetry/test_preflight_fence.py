@@ -9,6 +9,7 @@ import pytest
 from planning.basics.plan_model import Firmware
 from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint, circle, polygon
 from telemetry.flight.fence_actions import at_fence
+from telemetry.flight.fence_radius import circle_aboard
 from telemetry.flight.preflight.checks import Row
 from telemetry.flight.preflight.fence_check import fence_row, flown_within, sent_places
 from telemetry.topics.onboard_lists import PlacesOnboard
@@ -20,7 +21,7 @@ FENCE = Fence(
 )
 RALLY = (RallyPoint(47.002, 8.002, 30.5),)
 PLANNED = (FENCE, RALLY)
-ACTS = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 7.0, "FENCE_ACTION": 1.0, "FENCE_ALT_MAX": 80.0}
+ACTS = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 7.0, "FENCE_ACTION": 1.0, "FENCE_ALT_MAX": 80.0, "FENCE_RADIUS": 300.0}
 
 
 def aboard() -> PlacesOnboard:
@@ -97,7 +98,9 @@ def test_floor_and_ceiling_are_compared_with_what_the_vehicle_acts_at(changed, s
 
 
 def test_px4_keeps_a_ceiling_and_no_floor() -> None:
-    row = judged(PlacesOnboard(), (HEIGHTS, ()), {"GF_ACTION": 3.0, "GF_MAX_VER_DIST": 60.0}, "px4")
+    row = judged(
+        PlacesOnboard(), (HEIGHTS, ()), {"GF_ACTION": 3.0, "GF_MAX_VER_DIST": 60.0, "GF_MAX_HOR_DIST": 0.0}, "px4"
+    )
     assert (row.state, row.mend) == ("good", "")
     assert "PX4 has no floor: the vehicle knows nothing of the plan's." in row.text
     assert "The plan's ceiling at 60 m above home is on board." in row.text
@@ -111,6 +114,26 @@ def test_heights_of_the_vehicles_own_are_told_and_kept_to() -> None:
     assert "The vehicle keeps a ceiling of its own at 60 m above home; so does the flight." in row.text
     both = judged(aboard(), parameters=KEPT | {"FENCE_ALT_MAX": 80.0, "FENCE_TYPE": 5.0})
     assert "on board, the plan's; the flight is held against it. The plan's ceiling at 80 m above home is" in both.text
+
+
+def test_a_circle_around_home_at_which_the_vehicle_acts_is_told_and_one_that_was_not_read_is_to_be_accepted() -> None:
+    px4 = {"GF_ACTION": 2.0, "GF_MAX_VER_DIST": 0.0, "GF_MAX_HOR_DIST": 80.0}
+    for parameters, firmware, name, radius_m in (
+        (ACTS, "ardupilot", "FENCE_RADIUS", 300),
+        (px4, "px4", "GF_MAX_HOR_DIST", 80),
+    ):
+        row = judged(PlacesOnboard(), (NO_FENCE, ()), parameters, firmware)
+        assert row.state == "good"
+        assert f"The vehicle keeps within {radius_m} m of home ({name}); so does the flight." in row.text
+        unread = judged(PlacesOnboard(), (NO_FENCE, ()), parameters | {name: None}, firmware)
+        assert (unread.state, "was not read" in unread.text, "accept it" in unread.mend) == ("accept", True, True)
+        circle_of = circle_aboard(parameters, firmware, (47.0, 8.0)).circles
+        assert [(each.inclusion, each.centre_lat_lon_deg, each.radius_m) for each in circle_of] == [
+            (True, (47.0, 8.0), radius_m)
+        ]
+    assert circle_aboard(ACTS | {"FENCE_TYPE": 5.0}, "ardupilot", (47.0, 8.0)) == NO_FENCE
+    assert circle_aboard(ACTS | {"FENCE_ENABLE": 0.0}, "ardupilot", (47.0, 8.0)) == NO_FENCE
+    assert circle_aboard(px4 | {"GF_ACTION": 0.0}, "px4", (47.0, 8.0)) == NO_FENCE
 
 
 def test_nothing_anywhere_is_no_row() -> None:

@@ -11,6 +11,8 @@ from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint, fence_words,
 from planning.formats.fence_items import fence_items, fence_of, rally_items, rally_of
 from telemetry.flight.fence_actions import at_fence, deaf_to_shapes
 from telemetry.flight.fence_heights import NO_FLOOR, SAME_M, are_heights_told, heights_aboard
+from telemetry.flight.fence_radius import NAMES as RADIUS_NAMES
+from telemetry.flight.fence_radius import may_have_radius, radius_aboard_m
 from telemetry.flight.preflight.checks import Row
 from telemetry.mavlink.items import mission_items, wire_items
 from telemetry.mavlink.verify import compare
@@ -60,9 +62,10 @@ def fence_row(
             what = "fence" if kind == "fence" else "list of rally points"
             return Row("fence", "bad", f"The {what} on board is not the plan's.", "Upload the plan again.")
     does = at_fence(parameters, firmware)
-    heights = _heights(planned[0], parameters, firmware)
+    heights = _with_radius(_heights(planned[0], parameters, firmware), parameters, firmware)
     if not wanted and not any(held):
-        return Row("fence", "good", " ".join((*heights.words, does))) if heights.words else None
+        state = "accept" if heights.mend else "good"
+        return Row("fence", state, " ".join((*heights.words, does)), heights.mend) if heights.words else None
     whose = "the plan's" if wanted else "another than the plan's, which has none"
     if wanted and strange:
         whose = f"but {' and '.join(strange)} not the plan's"
@@ -77,7 +80,7 @@ def fence_row(
 
 @dataclass(frozen=True, slots=True)
 class _Heights:
-    """Floor and ceiling: the plan's, and those at which the vehicle acts."""
+    """Floor and ceiling: the plan's, and those at which the vehicle acts; and its circle around home."""
 
     words: tuple[str, ...]
     mend: str
@@ -111,6 +114,18 @@ def _heights(planned: Fence, parameters: Mapping[str, float | None], firmware: F
         else:
             words.append(f"The plan's {plans} is on board, stricter: {own_m:g} m; the flight is held against that.")
     return _Heights(tuple(words), mend)
+
+
+def _with_radius(heights: _Heights, parameters: Mapping[str, float | None], firmware: Firmware) -> _Heights:
+    """With the circle around home, which no plan has."""
+    name, radius_m = RADIUS_NAMES[firmware], radius_aboard_m(parameters, firmware)
+    if may_have_radius(parameters, firmware):
+        words = f"Whether the vehicle keeps a circle around home ({name}), and which, was not read."
+        return _Heights((*heights.words, words), f"{heights.mend} Check again, or accept it.".strip())
+    if radius_m is None:
+        return heights
+    words = f"The vehicle keeps within {radius_m:g} m of home ({name}); so does the flight."
+    return _Heights((*heights.words, words), heights.mend)
 
 
 _SET = "Set floor and ceiling on the vehicle under On board, or with: hedgehop fence LINK upload FILE --heights set."

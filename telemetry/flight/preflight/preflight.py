@@ -23,6 +23,7 @@ from planning.terrain.dsm import Dsm
 from planning.terrain.holes import fill_holes
 from planning.terrain.vertical_datum import is_amsl
 from telemetry.flight.fence_heights import heights_aboard
+from telemetry.flight.fence_radius import circle_aboard
 from telemetry.flight.preflight import checks
 from telemetry.flight.preflight.checks import Row
 from telemetry.flight.preflight.fence_check import fence_row, flown_within
@@ -131,6 +132,8 @@ def check(
     row = None if aboard is None else fence_row(planned, aboard, parameters, firmware)
     within = planned if aboard is None or (row is not None and row.state == "bad") else flown_within(planned, aboard)
     kept_to = within_both(within[0], heights_aboard(parameters, firmware))
+    around = circle_aboard(parameters, firmware, None if home is None else (home.lat_deg, home.lon_deg))
+    kept_to = within_both(kept_to, around)
     mission = None if mission is None else replace(mission, fence=kept_to, rally=within[1])
     surface = fill_holes(dsm)[0] if dsm is not None else None
     height_m = clearance.rtl_height_m if settings.height_m is None else settings.height_m
