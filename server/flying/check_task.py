@@ -74,6 +74,8 @@ class Checked:
     """What the vehicle does when it crosses its fence; empty: not read."""
     returns: ReturnSpeeds = field(default_factory=ReturnSpeeds)
     """At which the vehicle comes home."""
+    home_rises_m: float | None = None
+    """The vehicle's home above the plan's, whatever was moved since the upload; None: not known."""
 
 
 def check_start(
@@ -128,6 +130,7 @@ def check_start(
         guided_spare_m=None if found.certificate is None else _guided_spare_m(record, found.certificate),
         at_fence=at_fence(parameters, record.firmware),
         returns=return_speeds(parameters, record.firmware),
+        home_rises_m=None if found.home_shift_m is None else record.heights_moved_m + found.home_shift_m,
     )
 
 
@@ -194,7 +197,14 @@ def _moved(found: Preflight, record: PlanRecord, state: VehicleState, dsm: Dsm) 
     written = read_wpl(text)
     return Moved(
         items=items_from_mission(written),
-        record=replace(record, mission_wpl=text, digest="", certificate_json="", home_alt_dsm_m=home.alt_dsm_m),
+        record=replace(
+            record,
+            mission_wpl=text,
+            digest="",
+            certificate_json="",
+            home_alt_dsm_m=home.alt_dsm_m,
+            heights_moved_m=record.heights_moved_m + shift_m,
+        ),
         home=(home.lat_deg, home.lon_deg, home.alt_dsm_m),
         shift_m=shift_m,
     )

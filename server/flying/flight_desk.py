@@ -77,6 +77,9 @@ class FlightDesk:
         self._ready: Ready | None = None
         self._others = None if is_alone else PENDING
         self._busy = self._at_fence = ""
+        self._rises_m: float | None = None
+        self._rises_of: tuple[str | None, str] = None, ""
+        """Vehicle and mission that it was found for."""
         self._written = 0
         """How often parameters were written."""
         self._told: FlyState | None = None
@@ -97,8 +100,9 @@ class FlightDesk:
 
     @property
     def home_rises_m(self) -> float | None:
-        """The vehicle's home above the planned one, by the surface model; None: no check of the start stands."""
-        return None if self._ready is None else (self._ready.checked.doc.home_shift_m or 0.0)
+        """The vehicle's home above the planned one, by the surface model; None: the last check does not tell it, or is
+        void for more than parameters that were written."""
+        return self._rises_m if self._rises_of == (self._aboard.vehicle, self._aboard.digest) else None
 
     # What is heard
 
@@ -111,7 +115,7 @@ class FlightDesk:
             self._uploads.forget()
         self._checklist.on_link(status, armed=self._live.state is not None and self._live.state.armed)
         if self._ready is not None and not _still_holds(self._ready, status):
-            self._ready = None
+            self._ready = self._rises_m = None
         self.refresh()
 
     def on_flight(self, flight: FlightStatus) -> None:
@@ -130,14 +134,14 @@ class FlightDesk:
 
     def on_disarmed(self) -> None:
         """A flight changes what was checked before it, the battery above all."""
-        self._ready = None
+        self._ready = self._rises_m = None
         self._taking_up.forget()
         self._checklist.forget("The vehicle was disarmed: each flight is ticked for itself.")
         self.refresh()
 
     def on_home_set(self) -> None:
         """By order, or perhaps: what was checked before a start was checked for the home before."""
-        self._ready = None
+        self._ready = self._rises_m = None
         self.refresh()
 
     def on_parameters(self) -> None:
@@ -161,7 +165,7 @@ class FlightDesk:
     async def upload(self, operator: Operator, revision: int) -> FlyState:
         """Raises NotReadyError, NotCertifiedError, StaleRevisionError, TransferError and what the vehicle said."""
         async with self._doing("Uploading"):
-            self._ready = None
+            self._ready = self._rises_m = None
             made = await self._work.made_upload(revision, self._aboard.uploaded)
             check_firmware(made.record, self._state())
             await self._uploads.places_of_plan(operator, made)
@@ -198,7 +202,7 @@ class FlightDesk:
     async def check(self, operator: Operator) -> FlyState:
         """Raises MissionUnknownError when what is on board did not come from here."""
         async with self._doing("Checking the start"):
-            self._ready = None
+            self._ready = self._rises_m = None
             vehicle, state, written = self._vehicle_id(), self._state(), self._written
             checked = await self._checked(operator, state)
             if (moved := checked.moved) is not None:
@@ -211,6 +215,7 @@ class FlightDesk:
                 raise CheckNeededError("Parameters were written during the check.", advice="Press Check again.")
             self._at_fence, self._live.returns = checked.at_fence, checked.returns
             self._ready = Ready(checked, self._aboard.digest, vehicle, state, time.monotonic())
+            self._rises_m, self._rises_of = checked.home_rises_m, (vehicle, self._aboard.digest)
             if checked.certificate_json:
                 self._aboard.certified(checked.certificate_json)
                 await self._uploads.note()

@@ -278,6 +278,8 @@ class PlanRecord:
     """The plan's items before those, as ``mission_wpl``; empty where there are none."""
     passed_flown: int = 0
     """So many of them were flown when it was taken up; the others are left out."""
+    heights_moved_m: float = 0.0
+    """The home that ``mission_wpl`` counts from lies so much above the plan's: the sum of all moves since."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,7 +58,7 @@ class Link:
 class Bench:
     def __init__(self, *, floor_m: float | None = 5.0, ceiling_m: float | None = 60.0) -> None:
         plan = PlanDoc(fence=FenceDoc(floor_rel_home_m=floor_m, ceiling_rel_home_m=ceiling_m))
-        record = SimpleNamespace(firmware="ardupilot", plan_json=plan.model_dump_json())
+        record = SimpleNamespace(firmware="ardupilot", plan_json=plan.model_dump_json(), heights_moved_m=0.0)
         self.link, self.rises_m = Link(), 0.0
         self.aboard: Any = SimpleNamespace(record=record)
         self.live: Any = SimpleNamespace(state=object())
@@ -175,6 +175,9 @@ def test_a_home_that_lies_higher_than_planned_for_lowers_the_ceiling_and_says_wh
         unknown: Any = None
         bench.rises_m = unknown
         assert NOT_CHECKED in (await bench.desk.look()).notes
+        bench.aboard.record.heights_moved_m = 3.25  # it was known when the mission's heights were moved
+        shown = await bench.desk.look()
+        assert (shown.changes[0].after, NOT_CHECKED in shown.notes) == (56.75, True)
 
     run(play())
 

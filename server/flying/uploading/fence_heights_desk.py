@@ -19,7 +19,7 @@ from telemetry.flight.fence_heights_put import put_heights
 from telemetry.topics.parameters import ParameterWritten
 from telemetry.topics.requests import Operator, ReadParameters
 
-NOT_CHECKED = "How high home lies beside the planned one is not known yet: Check the start first where they differ."
+NOT_CHECKED = "How high home lies beside the planned one is not known now: Check the start first where they differ."
 
 
 class FenceHeights:
@@ -69,7 +69,9 @@ class FenceHeights:
         firmware: Firmware = record.firmware
         fence, _ = await asyncio.to_thread(places_of, record)
         parameters = await self._link.call(ReadParameters(NAMES[firmware]))
-        return height_changes(fence, parameters, firmware, home_rises_m=self._rises_m or 0.0)
+        # Unknown is not none: the heights of the mission on board were moved for a home that is known.
+        rises_m = record.heights_moved_m if self._rises_m is None else self._rises_m
+        return height_changes(fence, parameters, firmware, home_rises_m=rises_m)
 
 
 def _docs(found: HeightChanges) -> list[HeightChangeDoc]:
