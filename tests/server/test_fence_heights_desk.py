@@ -61,7 +61,7 @@ class Bench:
         record = SimpleNamespace(firmware="ardupilot", plan_json=plan.model_dump_json(), heights_moved_m=0.0)
         self.link, self.rises_m = Link(), 0.0
         self.aboard: Any = SimpleNamespace(record=record)
-        self.live: Any = SimpleNamespace(state=object())
+        self.live: Any = SimpleNamespace(state=SimpleNamespace(armed=False))
         self.told: list[tuple[ParameterWritten, ...]] = []
         link: Any = self.link
         self.desk = FenceHeights(link, self.live, self.aboard, lambda: self.rises_m, self._on_written)
@@ -132,7 +132,11 @@ def test_a_link_that_fails_in_between_is_told_with_what_was_set() -> None:
         bench.link.fails = {"FENCE_TYPE": NotAllowedError("The vehicle is armed.", advice="Land and disarm it.")}
         with pytest.raises(NotAllowedError, match="armed"):  # nothing at all was written
             await bench.desk.set(ME, SetFenceHeights(changes=(await bench.desk.look()).changes))
-        assert len(bench.told) == 2
+        assert len(bench.told) == 1, "what the watch knows in flight stays"
+        bench.link.fails = {"FENCE_TYPE": RefusedError("No answer.", advice="Look.")}
+        with pytest.raises(RefusedError):  # perhaps it was written
+            await bench.desk.set(ME, SetFenceHeights(changes=(await bench.desk.look()).changes))
+        assert bench.told[1:] == [()]
 
     run(play())
 
@@ -159,6 +163,18 @@ def test_a_fence_that_is_on_is_switched_off_and_on_and_comes_on_whatever_fails_b
         done = await bench.desk.set(ME, SetFenceHeights(changes=shown.changes))
         assert not done.took
         assert STAYS_OFF in done.written[-1].words
+
+    run(play())
+
+
+def test_of_an_armed_vehicle_nothing_is_read_written_or_forgotten() -> None:
+    async def play() -> None:
+        bench = Bench()
+        shown = await bench.desk.look()
+        bench.live.state.armed, bench.link.held = True, {}
+        with pytest.raises(NotAllowedError, match="armed"):
+            await bench.desk.set(ME, SetFenceHeights(changes=shown.changes))
+        assert bench.told == []
 
     run(play())
 

@@ -13,7 +13,7 @@ from server.heard.onboard import Aboard
 from server.library.documents import places_of
 from server.schemas import FenceHeightsDoc, FenceHeightsSet, HeightChangeDoc, SetFenceHeights
 from telemetry.bus.link_client import LinkClient
-from telemetry.errors import NoVehicleError
+from telemetry.errors import NotAllowedError, NoVehicleError
 from telemetry.flight.fence_heights import NAMES, HeightChanges, height_changes
 from telemetry.flight.fence_heights_put import put_heights
 from telemetry.topics.parameters import ParameterWritten
@@ -48,16 +48,22 @@ class FenceHeights:
         return FenceHeightsDoc(changes=_docs(found), notes=notes)
 
     async def set(self, operator: Operator, body: SetFenceHeights) -> FenceHeightsSet:
-        """Raises ConflictError unless they are what was shown; refused while the vehicle is armed."""
+        """Raises ConflictError unless they are what was shown; refused while the vehicle is armed, before anything is
+        read."""
+        if self._live.state is not None and self._live.state.armed:
+            raise NotAllowedError("The vehicle is armed.", advice="Set floor and ceiling once it is disarmed.")
         found = await self._found()
         if _docs(found) != body.changes:
             what = "The vehicle's settings, or what is on board, have changed since this was shown."
             raise ConflictError(what, advice="Look at what would change now.")
-        written: tuple[ParameterWritten, ...] = ()
         try:
             written = await put_heights(self._link, operator, found)
-        finally:
-            self._on_written(written)
+        except NotAllowedError:  # nothing was written
+            raise
+        except BaseException:
+            self._on_written(())
+            raise
+        self._on_written(written)
         return FenceHeightsSet(written=written_docs(written), took=all(one.took for one in written))
 
     async def _found(self) -> HeightChanges:
