@@ -19,7 +19,7 @@ from planning.formats.safe_text import clean_name
 from server.cli.shared import options as o
 from server.cli.shared.command import DONE, FAILED, command
 from server.cli.shared.files_in_out import check_directory, read_small, write_files
-from server.cli.shared.heights_set import HeightsDone, read_heights, set_heights
+from server.cli.shared.heights_set import HeightsDone, heights_unsent, read_heights, set_heights
 from server.cli.shared.output import answer, say, say_notes
 from server.cli.shared.own_nodes import OPERATOR, own_nodes
 from server.cli.shared.upload_words import report_lines, report_summary
@@ -141,8 +141,10 @@ class _Job:
             items, report = _items(self.kind, places, firmware), None
             if items or heights == "leave":
                 report = await station.link.call(UploadPlaces(OPERATOR, self.kind, wire_items(items)))
-            if found is None or (report is not None and not report.verified):
+            if found is None:
                 return _Done(report)
+            if report is not None and not report.verified:
+                return _Done(report, heights_unsent(found, writes=heights == "set"))
             return _Done(
                 report, await set_heights(station.link, found, writes=heights == "set", begun=report is not None)
             )

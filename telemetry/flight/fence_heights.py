@@ -33,6 +33,8 @@ NAMES: dict[Firmware, tuple[str, ...]] = {
 """What to read before they are set."""
 MARGIN_M, DEEPEST_M = 2.0, -100.0
 """ArduPilot's own margin where it does not tell it, and the lowest FENCE_ALT_MIN with which it arms."""
+LEAST_RETURN_M = 2.0
+"""Above home: a ceiling that keeps ArduPilot's return lower is refused."""
 HOLD = 2.0
 """GF_ACTION, as PX4 comes."""
 SAME_HOME_M = 0.3
@@ -123,7 +125,20 @@ def height_changes(
     wanted, notes = made(floor_m, ceiling_m, fence, parameters)
     found = tuple(each for each in wanted if abs(each.before - each.after) > SAME_M)
     after = dict(parameters) | {each.name: each.after for each in found}
-    return HeightChanges(found, (*notes, *filter(None, (at_fence(after, firmware),))))
+    looser = _looser(heights_aboard(parameters, firmware), heights_aboard(after, firmware))
+    return HeightChanges(found, (*looser, *notes, *filter(None, (at_fence(after, firmware),))))
+
+
+def _looser(before: Fence, after: Fence) -> list[str]:
+    """What acted and was stricter."""
+    notes: list[str] = []
+    for name, verb, old_m, new_m, way in (
+        ("ceiling", "raises", before.ceiling_rel_home_m, after.ceiling_rel_home_m, 1.0),
+        ("floor", "lowers", before.floor_rel_home_m, after.floor_rel_home_m, -1.0),
+    ):
+        if old_m is not None and new_m is not None and way * (new_m - old_m) > SAME_M:
+            notes.append(f"This {verb} the {name} that acts now, from {old_m:g} to {new_m:g} m above home.")
+    return notes
 
 
 def _px4(
@@ -165,10 +180,20 @@ def _ardupilot(
     wanted.append(HeightChange("FENCE_ENABLE", enabled, 1))
     margin_m = _margin_m(parameters)
     _refuse_unarmable(floor_m, ceiling_m, margin_m, parameters)
+    if ceiling_m is not None and ceiling_m < margin_m + LEAST_RETURN_M:
+        what = f"With a ceiling at {ceiling_m:g} m the vehicle would return at {ceiling_m - margin_m:g} m above home."
+        advice = f"Raise it to {margin_m + LEAST_RETURN_M:g} m or more: FENCE_MARGIN and {LEAST_RETURN_M:g} m."
+        raise NotAllowedError(what, where="FENCE_ALT_MAX", advice=advice)
     if kinds_before & CIRCLE_BIT and not kinds & CIRCLE_BIT:
         radius_m = parameters.get("FENCE_RADIUS")
         size = "" if radius_m is None else f", {radius_m:g} m"
         notes.append(f"The circle around home (FENCE_RADIUS{size}) stays off: the plan has none.")
+    if kinds_before & SHAPES_BIT and not kinds & SHAPES_BIT:
+        notes.append("Shapes on board, where there are any, stay off (FENCE_TYPE): the plan has none.")
+    if kinds_before & FLOOR_BIT and not kinds & FLOOR_BIT:
+        notes.append("The floor (FENCE_ALT_MIN) stays off: the plan has none.")
+    if kinds_before & CEILING_BIT and not kinds & CEILING_BIT:
+        notes.append("The ceiling (FENCE_ALT_MAX) stays off: the plan has none.")
     if ceiling_m is not None:
         notes.append(f"The vehicle then returns at {ceiling_m - margin_m:g} m at most: FENCE_MARGIN below the ceiling.")
     if floor_m is not None:

@@ -73,6 +73,11 @@ def lost(changes: Sequence[HeightChange], error: TelemetryError) -> tuple[Parame
     return _left(changes, "not sent" if nothing_sent else "unknown", str(error))
 
 
+def unsent(changes: Sequence[HeightChange], words: str) -> tuple[ParameterWritten, ...]:
+    """Of changes that were not tried."""
+    return _left(changes, "not sent", words)
+
+
 async def _write(link: Asks, operator: Operator, changes: Sequence[HeightChange]) -> tuple[ParameterWritten, ...]:
     asked = tuple(ParameterChange(each.name, each.after) for each in changes)
     return await link.call(WriteParameters(operator, asked))

@@ -45,6 +45,8 @@ def test_a_fence_that_is_off_comes_on_with_what_the_plan_has_and_nothing_else() 
     ]  # fmt: skip
     said = " ".join(made.notes)
     assert "The circle around home (FENCE_RADIUS, 300 m) stays off" in said
+    assert "Shapes on board, where there are any, stay off (FENCE_TYPE)" in said
+    assert "The ceiling (FENCE_ALT_MAX) stays off" not in said
     assert "returns at 58 m at most" in said
     assert "At its fence the vehicle returns, or lands where it cannot (FENCE_ACTION 1)." in said
 
@@ -63,6 +65,17 @@ def test_a_fence_that_is_on_is_switched_anew_where_it_gains_a_kind_that_it_takes
     switched = ["FENCE_ENABLE 1 -> 0", "FENCE_ENABLE 0 -> 1"] if is_anew else []
     assert [each for each in words(made) if "ENABLE" in each] == switched
     assert (TAKEN_WHEN_SWITCHED in made.notes) is is_anew
+
+
+def test_a_ceiling_or_a_floor_that_acts_and_is_stricter_is_not_loosened_without_a_word() -> None:
+    acts = COPTER | {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 9.0, "FENCE_ALT_MAX": 40.0, "FENCE_ALT_MIN": 8.0}
+    notes = height_changes(BOTH, acts, "ardupilot").notes
+    assert notes[0] == "This raises the ceiling that acts now, from 40 to 60 m above home."
+    assert notes[1] == "This lowers the floor that acts now, from 8 to 5 m above home."
+    for stricter in ({"FENCE_ALT_MAX": 70.0, "FENCE_ALT_MIN": 4.0}, {"FENCE_ENABLE": 0.0}):
+        assert "that acts now" not in " ".join(height_changes(BOTH, acts | stricter, "ardupilot").notes)
+    px4 = height_changes(Fence(ceiling_rel_home_m=60.0), PX4 | {"GF_MAX_VER_DIST": 30.0}, "px4")
+    assert "This raises the ceiling that acts now" in px4.notes[0]
 
 
 def test_shapes_of_the_plan_act_too_once_it_is_switched_on() -> None:
@@ -92,6 +105,8 @@ def test_px4_takes_a_ceiling_says_that_it_has_no_floor_and_is_switched_on() -> N
         (NO_FENCE, {}, "ardupilot", "neither floor nor ceiling"),
         (Fence(ceiling_rel_home_m=-3.0), {}, "ardupilot", "A ceiling at -3 m above home is none"),
         (Fence(ceiling_rel_home_m=0.004), {}, "px4", "A ceiling at 0 m above home is none"),
+        (Fence(ceiling_rel_home_m=1.0), {}, "ardupilot", "would return at -1 m above home"),
+        (Fence(ceiling_rel_home_m=3.9), {}, "ardupilot", "would return at 1.9 m above home"),
         (Fence(floor_rel_home_m=-120.0), {}, "ardupilot", "-100 m is its lowest"),
         (Fence(floor_rel_home_m=5.0, ceiling_rel_home_m=9.0), {}, "ardupilot", "The vehicle would not arm"),
         (Fence(floor_rel_home_m=97.0), {}, "ardupilot", "The vehicle would not arm"),

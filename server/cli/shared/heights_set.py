@@ -12,9 +12,11 @@ from server.cli.shared.own_nodes import OPERATOR
 from telemetry.bus.link_client import LinkClient
 from telemetry.errors import TelemetryError
 from telemetry.flight.fence_heights import NAMES, HeightChanges, height_changes
-from telemetry.flight.fence_heights_put import lost, put_heights
+from telemetry.flight.fence_heights_put import lost, put_heights, unsent
 from telemetry.topics.parameters import ParameterWritten
 from telemetry.topics.requests import ReadParameters
+
+SHAPES_FIRST = "It was not set: the shapes on board are not those that were sent."
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +66,11 @@ async def read_heights(link: LinkClient, fence: Fence, firmware: Firmware) -> He
     for note in found.notes:
         say(f"  {note}")
     return found
+
+
+def heights_unsent(found: HeightChanges, *, writes: bool) -> HeightsDone:
+    """Where the shapes were sent and are not on board as sent."""
+    return HeightsDone(found, unsent(found.changes, SHAPES_FIRST) if writes else (), writes)
 
 
 async def set_heights(link: LinkClient, found: HeightChanges, *, writes: bool, begun: bool) -> HeightsDone:
