@@ -91,7 +91,8 @@ def test_what_no_sensor_saw_is_said_and_what_the_station_refuses_is_in_its_words
     run = goto(served, "home")
     assert run.code == 1
     assert run.json["error"]["what"] == "Sensors have seen more near the way."
-    assert desk.asked[-1] == ("drop",)
+    assert desk.asked[-1] == ("fly", "judged", False), "what may be flown is not put away"
+    assert "It may be flown: look at the console." in run.err
     desk.refuses = None
     assert "no sensor of the station has seen anything" in goto(served, "home").err
 

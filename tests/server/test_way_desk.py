@@ -49,7 +49,16 @@ def test_a_way_is_judged_shown_and_flown_from_where_the_vehicle_hovers(
 
         with pytest.raises(NotFoundError, match="Nothing is judged any more"):
             await bench.desk.fly(ME, FlyWayBody(id="another"))
+        vehicle: Any = bench.vehicle
+        call = vehicle.call
+
+        async def call_while_it_is_put_away(request: Any) -> Any:
+            assert bench.desk.drop().way is not None, "what is being ordered is not put away"
+            return await call(request)
+
+        vehicle.call = call_while_it_is_put_away
         await bench.desk.fly(ME, FlyWayBody(id=way.id))
+        vehicle.call = call
         request = bench.vehicle.told[-1]
         assert isinstance(request, FlyWay)
         assert request.most_m_s == bench.document.profile.max_speed_m_s

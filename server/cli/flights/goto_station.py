@@ -12,10 +12,12 @@ from server.cli.shared.command import DONE, FAILED
 from server.cli.shared.output import answer, end_progress, progress, say_notes
 from server.errors import StationError
 from server.schemas import GuidedState, WayBody, WayDoc
+from telemetry.bus.link_client import START_S
 
 WAY = "/api/flight/way"
-JUDGED_WITHIN_S, ORDERED_WITHIN_S = 180.0, 60.0
-"""A large model on a slow computer; a vehicle over a bad link."""
+JUDGED_WITHIN_S, ORDERED_WITHIN_S = 180.0, START_S + 15.0
+"""A large model on a slow computer; the link's own time for a start over a bad link, and the way there."""
+MAY_FLY = "It may be flown: look at the console."
 WATCH = "The station flies it: watch it in the console, where Hold stands."
 
 
@@ -25,15 +27,18 @@ def goto_by_station(
     """The command's exit code. Raises BadRequestError where no station runs, StationError."""
     with station_session(data_dir, vehicle) as station:
         station.take_control()
-        ordered = False
+        is_ordering = ordered = False
         try:
             way = _judged(station, body)
             if may_fly and (way.problem is None or (way.problem == "return" and accepts)):
+                is_ordering = True
                 _order(station, way, accepts=accepts)
                 ordered = True
         finally:
-            if not ordered:
+            if not is_ordering:
                 station.put_away(WAY)
+            elif not ordered:
+                say_notes(MAY_FLY)
     if may_fly and way.problem == "return" and not accepts:
         say_notes("The way itself is clear. --accept-return flies it all the same.")
     if not way.has_seen:

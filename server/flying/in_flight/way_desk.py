@@ -163,8 +163,8 @@ class WayDesk:
             self._tell()
 
     def drop(self) -> GuidedState:
-        """What was judged is put away; what is flown goes on, and stays on show."""
-        if self._in_hand is not None and not self._in_hand.doc.flies:
+        """What was judged is put away; what is flown or being ordered goes on, and stays on show."""
+        if self._in_hand is not None and not self._in_hand.doc.flies and not self._is_ordering:
             self._in_hand = None
             self._tell()
         return self.state
