@@ -26,11 +26,14 @@ from telemetry.flight.fence_actions import (
 NAMES: dict[Firmware, tuple[str, ...]] = {
     "ardupilot": (
         *("FENCE_ENABLE", "FENCE_AUTOENABLE", "FENCE_TYPE", "FENCE_ACTION", "FENCE_ALT_MAX", "FENCE_ALT_MIN"),
-        *("FENCE_MARGIN", "FENCE_RADIUS"),
+        *("FENCE_MARGIN", "FENCE_RADIUS", "FENCE_ALT_MAX_TP", "FENCE_ALT_MIN_TP"),
     ),
     "px4": ("GF_ACTION", "GF_MAX_VER_DIST", "GF_MAX_HOR_DIST"),
 }
 """What to read before they are set."""
+COUNTED_BY = {CEILING_BIT: "FENCE_ALT_MAX_TP", FLOOR_BIT: "FENCE_ALT_MIN_TP"}
+"""What newer ArduPilot counts the heights from: 0 sea level, 1 home, then its origin and the terrain."""
+ABOVE_HOME = 1.0
 MARGIN_M, DEEPEST_M = 2.0, -100.0
 """ArduPilot's own margin where it does not tell it, and the lowest FENCE_ALT_MIN with which it arms."""
 LEAST_RETURN_M = 2.0
@@ -81,10 +84,25 @@ def heights_aboard(parameters: Mapping[str, float | None], firmware: Firmware) -
         most_m = parameters.get("GF_MAX_VER_DIST")
         return Fence(ceiling_rel_home_m=most_m if most_m is not None and most_m > 0 else None)
     kinds = int(parameters.get("FENCE_TYPE") or 0)
+    kinds &= ~sum(bit for bit, name in COUNTED_BY.items() if _is_otherwise(parameters, name))
     return Fence(
         floor_rel_home_m=parameters.get("FENCE_ALT_MIN") if kinds & FLOOR_BIT else None,
         ceiling_rel_home_m=parameters.get("FENCE_ALT_MAX") if kinds & CEILING_BIT else None,
     )
+
+
+def counted_otherwise(parameters: Mapping[str, float | None], firmware: Firmware) -> tuple[str, ...]:
+    """What tells that a height at which the vehicle acts is none above home: it can be compared with nothing here."""
+    if firmware == "px4" or not is_switched_on(parameters, firmware):
+        return ()
+    kinds = int(parameters.get("FENCE_TYPE") or 0)
+    return tuple(name for bit, name in COUNTED_BY.items() if kinds & bit and _is_otherwise(parameters, name))
+
+
+def _is_otherwise(parameters: Mapping[str, float | None], name: str) -> bool:
+    """Of a vehicle that has no such parameter all heights are above home."""
+    value = parameters.get(name)
+    return value is not None and value != ABOVE_HOME
 
 
 def are_heights_told(parameters: Mapping[str, float | None], firmware: Firmware) -> bool:
@@ -166,6 +184,10 @@ def _ardupilot(
     own |= SHAPES_BIT * bool(fence.polygons or fence.circles)
     # What acts already goes on to act; what a fence that is off would bring along is nobody's wish.
     kinds = kinds_before | own if was_on else own
+    for bit, name in COUNTED_BY.items():
+        if own & bit and _is_otherwise(parameters, name):
+            what = f"The vehicle does not count this height from home: {name} is {parameters[name]:g}."
+            raise NotAllowedError(what, where=name, advice=f"Set {name} to {ABOVE_HOME:g} under Parameters first.")
     wanted: list[HeightChange] = []
     if ceiling_m is not None:
         wanted.append(HeightChange("FENCE_ALT_MAX", _told(parameters, "FENCE_ALT_MAX"), ceiling_m, "m"))

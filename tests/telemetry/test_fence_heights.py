@@ -78,6 +78,19 @@ def test_a_ceiling_or_a_floor_that_acts_and_is_stricter_is_not_loosened_without_
     assert "This raises the ceiling that acts now" in px4.notes[0]
 
 
+@pytest.mark.parametrize(("name", "fence"), [("FENCE_ALT_MAX_TP", BOTH), ("FENCE_ALT_MIN_TP", BOTH)])
+def test_a_height_that_is_not_counted_from_home_is_not_set_compared_or_returned_at(name, fence) -> None:
+    acts = COPTER | {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 9.0, "FENCE_ALT_MAX": 60.0, "FENCE_ALT_MIN": 5.0}
+    assert height_changes(fence, acts | {name: 1.0}, "ardupilot").changes == ()
+    for counts in (0.0, 2.0, 3.0):
+        with pytest.raises(NotAllowedError, match=f"{name} is {counts:g}"):
+            height_changes(fence, acts | {name: counts}, "ardupilot")
+        own = heights_aboard(acts | {name: counts}, "ardupilot")
+        is_ceiling = name == "FENCE_ALT_MAX_TP"
+        assert (own.ceiling_rel_home_m is None, own.floor_rel_home_m is None) == (is_ceiling, not is_ceiling)
+        assert (highest_return_m(acts | {name: counts}, "ardupilot") == math.inf) is is_ceiling
+
+
 def test_shapes_of_the_plan_act_too_once_it_is_switched_on() -> None:
     made = height_changes(Fence(circles=(SHAPE,), ceiling_rel_home_m=60.0), COPTER, "ardupilot")
     assert "FENCE_TYPE 7 -> 5" in words(made)

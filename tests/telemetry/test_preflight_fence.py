@@ -136,6 +136,13 @@ def test_a_circle_around_home_at_which_the_vehicle_acts_is_told_and_one_that_was
     assert circle_aboard(px4 | {"GF_ACTION": 0.0}, "px4", (47.0, 8.0)) == NO_FENCE
 
 
+def test_a_height_that_is_not_counted_from_home_is_to_be_accepted() -> None:
+    row = judged(PlacesOnboard(), (NO_FENCE, ()), KEPT | {"FENCE_ALT_MAX_TP": 0.0})
+    assert row.state == "accept"
+    assert "is not counted from home (FENCE_ALT_MAX_TP 0)" in row.text
+    assert "ceiling of its own" not in row.text
+
+
 def test_nothing_anywhere_is_no_row() -> None:
     for off in ({"FENCE_ENABLE": 0.0}, {"FENCE_TYPE": 4.0}):
         assert fence_row((NO_FENCE, ()), PlacesOnboard(), ACTS | off, "ardupilot") is None

@@ -29,7 +29,7 @@ from telemetry.topics.onboard_lists import Item
 from telemetry.topics.vehicle import VehicleState
 
 CEILING_PARAMETERS = (
-    *("FENCE_ENABLE", "FENCE_AUTOENABLE", "FENCE_TYPE", "FENCE_ALT_MAX"),
+    *("FENCE_ENABLE", "FENCE_AUTOENABLE", "FENCE_TYPE", "FENCE_ALT_MAX", "FENCE_ALT_MAX_TP"),
     *("GF_ACTION", "GF_MAX_VER_DIST"),
 )
 """ArduPilot's and PX4's: a vehicle has those of one."""

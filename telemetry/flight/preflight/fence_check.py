@@ -10,7 +10,7 @@ from planning.errors import FormatError
 from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint, fence_words, within_both
 from planning.formats.fence_items import fence_items, fence_of, rally_items, rally_of
 from telemetry.flight.fence_actions import at_fence, deaf_to_shapes
-from telemetry.flight.fence_heights import NO_FLOOR, SAME_M, are_heights_told, heights_aboard
+from telemetry.flight.fence_heights import NO_FLOOR, SAME_M, are_heights_told, counted_otherwise, heights_aboard
 from telemetry.flight.fence_radius import NAMES as RADIUS_NAMES
 from telemetry.flight.fence_radius import may_have_radius, radius_aboard_m
 from telemetry.flight.preflight.checks import Row
@@ -118,6 +118,10 @@ def _heights(planned: Fence, parameters: Mapping[str, float | None], firmware: F
 
 def _with_radius(heights: _Heights, parameters: Mapping[str, float | None], firmware: Firmware) -> _Heights:
     """With the circle around home, which no plan has."""
+    for each in counted_otherwise(parameters, firmware):
+        words = f"A height at which the vehicle acts is not counted from home ({each} {parameters[each]:g}):"
+        words = f"{words} it is compared with nothing, and the flight is not held against it."
+        heights = _Heights((*heights.words, words), f"{heights.mend} Set {each} to 1, or accept it.".strip())
     name, radius_m = RADIUS_NAMES[firmware], radius_aboard_m(parameters, firmware)
     if may_have_radius(parameters, firmware):
         words = f"Whether the vehicle keeps a circle around home ({name}), and which, was not read."

@@ -24,6 +24,7 @@ NAMES: dict[Firmware, tuple[str, ...]] = {
         *("RTL_ALT_FINAL", "RTL_ALT_FINAL_M"),
         *("FENCE_ENABLE", "FENCE_AUTOENABLE", "FENCE_TYPE", "FENCE_ACTION", "FENCE_MARGIN"),
         *("FENCE_ALT_MAX", "FENCE_ALT_MIN", "FENCE_RADIUS"),
+        *("FENCE_ALT_MAX_TP", "FENCE_ALT_MIN_TP"),
     ),
     "px4": (
         *("RTL_RETURN_ALT", "RTL_CONE_ANG", "RTL_MIN_DIST", "RTL_LAND_DELAY", "GF_ACTION"),
