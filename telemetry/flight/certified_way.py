@@ -20,7 +20,7 @@ from planning.planner.part import FLIGHT_MARGIN_M, needed_part, rally_places
 from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.holes import fill_holes
 from telemetry.errors import NotAllowedError
-from telemetry.flight.fence_heights import heights_aboard
+from telemetry.flight.fence_heights import SAME_M, heights_aboard, lowest_way_m
 from telemetry.flight.fence_radius import circle_aboard
 from telemetry.flight.guided.handover import is_fresh
 from telemetry.flight.guided.script_targets import bearing_rad
@@ -117,7 +117,21 @@ def judged_way(
         rally=flown.rally,
     )
     way = guided_way(fill_holes(ground if seen is None else seen)[0], ground, here, wish, demand)
-    return way if isinstance(wish, RETURNS) else _own_return_known(way, state, flown)
+    return way if isinstance(wish, RETURNS) else _own_return_known(_floor_kept(way, state, flown), state, flown)
+
+
+def _floor_kept(way: GuidedWay, state: VehicleState, flown: Flown) -> GuidedWay:
+    """Once above its floor the vehicle acts at it: no way but a landing leads back below. One that is below climbs."""
+    lowest_m = lowest_way_m(flown.parameters, _firmware(state))
+    ends_m = min((place[2] for place in way.places[1:]), default=math.inf)
+    if state.alt_rel_home_m is None or state.alt_rel_home_m < lowest_m or ends_m >= lowest_m - SAME_M:
+        return way
+    what = (
+        f"The way leads to {ends_m:.2f} m above home; the vehicle acts at its own floor, {lowest_m:.2f} m with margin."
+    )
+    reason = Reason("floor", what, "Ask for a greater height, or lower FENCE_ALT_MIN once it is landed.")
+    certificate = replace(way.certificate, certified=False, reasons=(*way.certificate.reasons, reason))
+    return replace(way, certificate=certificate, problem="way")
 
 
 def _own_return_known(way: GuidedWay, state: VehicleState, flown: Flown) -> GuidedWay:

@@ -120,6 +120,12 @@ def highest_return_m(parameters: Mapping[str, float | None], firmware: Firmware)
     return top_m - _margin_m(parameters)
 
 
+def lowest_way_m(parameters: Mapping[str, float | None], firmware: Firmware) -> float:
+    """Above home: the floor at which the vehicle acts, and its margin above that; -inf: it acts at none."""
+    floor_m = heights_aboard(parameters, firmware).floor_rel_home_m
+    return -math.inf if floor_m is None else floor_m + _margin_m(parameters)
+
+
 def height_changes(
     fence: Fence, parameters: Mapping[str, float | None], firmware: Firmware, *, home_rises_m: float = 0.0
 ) -> HeightChanges:

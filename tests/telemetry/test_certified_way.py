@@ -77,6 +77,13 @@ def test_the_vehicles_own_ceiling_is_kept_and_its_floor_stops_no_climb_from_belo
     assert way.problem == "way"
     assert "ceiling is at 30 m" in " ".join(way.reasons)
     assert judged(GoTo(30.0), acts | {"FENCE_ALT_MAX": 30.0, "FENCE_ENABLE": 0.0}).problem is None
+    low = acts | {"FENCE_ALT_MAX": 100.0, "FENCE_MARGIN": 2.0}
+    for floor_m, problem in ((8.0, "way"), (7.0, None), (11.0, None)):  # from 12 m to 9 m; below it no floor acts yet
+        down = judged(GoTo(9.0), low | {"FENCE_ALT_MIN": floor_m})
+        assert (down.problem, "its own floor" in " ".join(r.text for r in down.certificate.reasons)) == (
+            problem,
+            problem is not None,
+        )
     around = acts | {"FENCE_TYPE": 2.0, "FENCE_RADIUS": 900.0}
     assert judged(GoTo(30.0), around).problem is None
     assert judged(GoTo(30.0), around | {"FENCE_RADIUS": 1.0}).problem == "way"

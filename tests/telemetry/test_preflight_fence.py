@@ -118,10 +118,11 @@ def test_heights_of_the_vehicles_own_are_told_and_kept_to() -> None:
 
 def test_a_circle_around_home_at_which_the_vehicle_acts_is_told_and_one_that_was_not_read_is_to_be_accepted() -> None:
     px4 = {"GF_ACTION": 2.0, "GF_MAX_VER_DIST": 0.0, "GF_MAX_HOR_DIST": 80.0}
-    for parameters, firmware, name, radius_m in (
+    of_both: tuple[tuple[dict[str, float], Firmware, str, int], ...] = (
         (ACTS, "ardupilot", "FENCE_RADIUS", 300),
         (px4, "px4", "GF_MAX_HOR_DIST", 80),
-    ):
+    )
+    for parameters, firmware, name, radius_m in of_both:
         row = judged(PlacesOnboard(), (NO_FENCE, ()), parameters, firmware)
         assert row.state == "good"
         assert f"The vehicle keeps within {radius_m} m of home ({name}); so does the flight." in row.text
