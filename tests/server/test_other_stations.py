@@ -23,12 +23,12 @@ from server.flying.apart.nearness import (
     VEER_SHARE,
     Flown,
     Nearness,
-    found_among,
+    found_elsewhere,
     near_each_other,
 )
 from server.flying.apart.other_stations import COUNTS_S, FASTEST_M_S, OLD_S, Meeting, OtherStations
 from server.flying.apart.other_vehicles import OtherVehicles, row_against
-from server.flying.apart.others_heard import LISTENED_S, NODE_SILENT_S, VEHICLE_SILENT_S, row_of_others
+from server.flying.apart.others_heard import NODE_SILENT_S
 from server.flying.apart.own_told import fleet_vehicle
 from server.heard.plan_follower import Ahead
 from server.schemas import StationsMessage, VehicleAlarm, VehicleDoc
@@ -212,10 +212,60 @@ def test_both_alarms_name_the_other_station_and_only_ours_can_be_held() -> None:
     alarm = nearness.alarms[1]
     assert alarm.text.startswith("Bee and Wasp (Bravo 1) may come within 4 m of each other now.")
     assert "call the other station" in alarm.text
-    assert alarm.key == "near 1 Wasp (Bravo 1)"
+    assert alarm.key == "near 1 Bravo 1"
+    # Seen once is seen: another name makes no other alarm.
+    desk.tell(other(2 * RADIUS_M + NEAR_M - 1.0, name="Hornet"))
+    asyncio.run(nearness.look())
+    assert nearness.alarms[1].text.startswith("Bee and Hornet (Bravo 1)")
+    assert nearness.alarms[1].key == "near 1 Bravo 1"
     desk.tell(other(60.0))
     asyncio.run(nearness.look())
     assert nearness.alarms == {}
+
+
+def _own_pair(desk: Desk) -> Nearness:
+    """Two of this station's that fly at each other, 20 m apart."""
+
+    def channel(east_m: float, east_m_s: float) -> Any:
+        lat_deg, lon_deg = moved_deg(HOME, east_m, 0.0)
+        state = VehicleState(
+            1, 1, armed=True, position_t_mono_s=NOW_S, lat_deg=lat_deg, lon_deg=lon_deg, alt_amsl_m=500.0,
+            v_east_m_s=east_m_s, v_north_m_s=0.0, v_down_m_s=0.0,
+        )  # fmt: skip
+        return SimpleNamespace(state=state, in_air=True, flight=None, follower=SimpleNamespace(ahead=lambda _: None))
+
+    channels = {1: ("Bee", channel(0.0, 5.0)), 2: ("Fly", channel(20.0, -5.0))}
+    return Nearness(channels, elsewhere=desk.it.flown, now_mono_s=lambda: NOW_S)
+
+
+@pytest.mark.parametrize(
+    "others",
+    [
+        pytest.param((other(10.0),), id="between them"),
+        pytest.param((other(350.0, age_s=29.0),), id="may be there"),
+        pytest.param((other(300.0, age_s=COUNTS_S + 10.0),), id="not heard any more"),
+        pytest.param((other(350.0, within_m=200.0),), id="its place is vague"),
+    ],
+)
+def test_what_others_tell_hides_no_alarm_between_ones_own(others: tuple[OtherVehicle, ...]) -> None:
+    nearness = _own_pair(Desk(*others))
+    asyncio.run(nearness.look())
+    assert [alarm.key for alarm in nearness.alarms.values()] == ["near 1 2", "near 1 2"]
+    assert nearness.alarms[1].text.startswith("Bee and Fly may come within 0 m")
+    assert "Wasp (Bravo 1)" in nearness.alarms[1].text
+
+
+def test_alarms_between_ones_own_wait_for_no_other_station() -> None:
+    desk, told = Desk(other(10.0)), list[str]()
+
+    def elsewhere(now_s: float) -> list[Flown]:
+        told.extend(alarm.key for alarm in nearness.alarms.values())
+        return desk.it.flown(now_s)
+
+    nearness = _own_pair(desk)
+    nearness._elsewhere = elsewhere
+    asyncio.run(nearness.look())
+    assert told == ["near 1 2", "near 1 2"]
 
 
 def test_a_station_of_which_the_node_no_longer_tells_is_lost_with_words() -> None:
@@ -260,7 +310,7 @@ def test_the_glance_at_distances_leaves_no_alarm_out(seed: int) -> None:
     drawn = random.Random(seed)
     own = {number: _anywhere(drawn, f"{number}") for number in (1, 2)}
     others = {name: _anywhere(drawn, name) for name in "abcdef"}
-    found = found_among(own, NOW_S, others)
+    found = found_elsewhere(own, NOW_S, others)
     for one, other_one in product(own, others):
         whole = near_each_other(own[one], others[other_one], NOW_S)
         if whole is not None and whole.distance_m < OVER_M:
@@ -281,47 +331,6 @@ def _anywhere(drawn: random.Random, name: str) -> Flown:
     t_s = np.arange(1.0, 9.0) * drawn.choice([2.0, 30.0])
     ahead = Ahead(lat_lon_deg=np.array([lat_deg, lon_deg]) + steps, alt_rel_home_m=np.full(8, 20.0), t_s=t_s)
     return Flown(name, replace(state, home_alt_amsl_m=drawn.choice([None, 480.0])), ahead)
-
-
-BRAVO = OtherStation("Bravo", "live", NOW_S, 0.0, 2, hears_us=True)
-STANDS = other(in_air=False, armed=False, link="live"), other(in_air=False, armed=False, link="none", number=2)
-GOOD = heard(BRAVO, *STANDS)
-CHARLIE = OtherStation("Charlie", "live", NOW_S, 0.0, 0, hears_us=True)
-
-
-def test_before_a_start_all_that_is_known_of_is_heard_and_stands() -> None:
-    row = row_of_others(GOOD, NOW_S)
-    assert (row.state, row.mend) == ("good", "")
-
-
-@pytest.mark.parametrize(
-    ("status", "words"),
-    [
-        (None, "not heard"),
-        (replace(GOOD, t_mono_s=NOW_S - NODE_SILENT_S - 0.1), "not heard"),
-        (replace(GOOD, router="lost"), "not heard"),
-        (replace(GOOD, listens_since_t_mono_s=None), "only just"),
-        (replace(GOOD, listens_since_t_mono_s=NOW_S - LISTENED_S + 0.1), "only just"),
-        (replace(GOOD, leaves_out="There are more."), "There are more."),
-        (replace(GOOD, stations=(), vehicles=()), "No other station is heard"),
-        (replace(GOOD, stations=(BRAVO, replace(CHARLIE, state="lost"))), "Charlie is not heard"),
-        (replace(GOOD, stations=(BRAVO, replace(CHARLIE, is_double=True))), "two stations called Charlie"),
-        (replace(GOOD, stations=(BRAVO, replace(CHARLIE, hears_us=False))), "by Charlie"),
-        (replace(GOOD, stations=(BRAVO, replace(CHARLIE, vehicles=1))), "1 vehicles, and 0 of them"),
-        (heard(BRAVO, STANDS[0]), "2 vehicles, and 1 of them"),
-        (heard(BRAVO, STANDS[0], other(in_air=False, link="lost", number=2)), "not heard: Wasp (Bravo 2)"),
-        (heard(BRAVO, STANDS[0], other(in_air=False, link="stale", number=2)), "not heard: Wasp (Bravo 2)"),
-        (
-            heard(BRAVO, STANDS[0], replace(STANDS[1], heard_t_mono_s=NOW_S - VEHICLE_SILENT_S - 0.1)),
-            "not heard: Wasp (Bravo 2)",
-        ),
-        (heard(BRAVO, STANDS[0], other(number=2, link="live")), "In the air, and no plan tells where it will be"),
-    ],
-)
-def test_before_a_start_nothing_that_is_not_heard_is_taken_for_clear(status: StationsStatus | None, words: str) -> None:
-    row = row_of_others(status, NOW_S)
-    assert (row.state, row.mend) == ("accept", "Agree with whoever flies there.")
-    assert words in row.text
 
 
 def test_the_row_of_the_check_holds_what_both_say() -> None:

@@ -52,10 +52,12 @@ class Flown:
     """Added to its ball: what it may have moved because the age of its position is not known well."""
     is_silent: bool = False
     """Of another station, and not heard for so long that nothing tells where it is by now."""
+    key: str = ""
+    """Of another station: its name and the vehicle's number there. What its vehicle is called may be anything."""
 
 
 Pair = tuple[int, int | str]
-"""Two of the station's vehicles by their numbers; or one, and another station's by its name."""
+"""Two of the station's vehicles by their numbers; or one, and another station's by its key."""
 
 
 class Nearness:
@@ -70,7 +72,9 @@ class Nearness:
     ) -> None:
         """``elsewhere``: other stations' vehicles in the air; they are held against these, not against each other."""
         self._channels, self._elsewhere, self._now_mono_s = channels, elsewhere, now_mono_s
-        self._near: dict[Pair, Nearest] = {}
+        self._own: dict[Pair, Nearest] = {}
+        self._others: dict[Pair, Nearest] = {}
+        self._of_others: dict[int, VehicleAlarm] = {}
         self.alarms: dict[int, VehicleAlarm] = {}
 
     async def run(self) -> None:
@@ -90,55 +94,79 @@ class Nearness:
             if channel.state is not None and channel.in_air and channel.state.lat_deg is not None
         }
         now_s = self._now_mono_s()
-        elsewhere = {each.name: each for each in self._elsewhere(now_s)}
-        found = await asyncio.to_thread(found_among, flown, now_s, elsewhere)
-        limits_m = {pair: OVER_M if pair in self._near else NEAR_M for pair in found}
-        self._near = {pair: at for pair, at in found.items() if at.distance_m < limits_m[pair]}
-        self.alarms = {}
-        silent = {name for name, each in elsewhere.items() if each.is_silent}
-        # Of several the nearest is told, and before one that may be anywhere one that is there.
-        for (one, other), at in sorted(self._near.items(), key=lambda it: (it[0][1] not in silent, -it[1].distance_m)):
-            if isinstance(other, str):
-                self.alarms[one] = _of_other_station(one, flown[one].name, elsewhere[other], at, now_s)
-                continue
-            key = f"near {one} {other}"
-            for its, name, others_name in (
-                (one, flown[one].name, flown[other].name),
-                (other, flown[other].name, flown[one].name),
-            ):
-                text = f"{said(name, others_name, at, now_s)} {_ADVICE}"
-                self.alarms[its] = VehicleAlarm(kind="near", key=key, text=text)
+        # One's own first, and told at once: whatever others tell delays no alarm between these.
+        self._own = _near(await asyncio.to_thread(found_among, flown, now_s), self._own)
+        of_own = _of_own(flown, self._own, now_s)
+        self.alarms = {number: of for number, of in self._of_others.items() if number in flown} | of_own
+        elsewhere = {each.key: each for each in self._elsewhere(now_s)}
+        self._others = _near(await asyncio.to_thread(found_elsewhere, flown, now_s, elsewhere), self._others)
+        self._of_others = _of_other_stations(flown, elsewhere, self._others, now_s)
+        self.alarms = self._of_others | {
+            number: _both(of, self._of_others.get(number)) for number, of in of_own.items()
+        }
+
+
+def _near(found: Mapping[Pair, Nearest], before: Mapping[Pair, Nearest]) -> dict[Pair, Nearest]:
+    """Those that come too near, or did and are not well apart yet."""
+    return {pair: at for pair, at in found.items() if at.distance_m < (OVER_M if pair in before else NEAR_M)}
+
+
+def _of_own(flown: Mapping[int, Flown], near: Mapping[Pair, Nearest], now_s: float) -> dict[int, VehicleAlarm]:
+    """Of several the nearest is told."""
+    alarms: dict[int, VehicleAlarm] = {}
+    for (one, other), at in sorted(near.items(), key=lambda it: -it[1].distance_m):
+        assert isinstance(other, int)
+        for its, theirs in ((one, other), (other, one)):
+            text = f"{said(flown[its].name, flown[theirs].name, at, now_s)} {_ADVICE}"
+            alarms[its] = VehicleAlarm(kind="near", key=f"near {one} {other}", text=text)
+    return alarms
+
+
+def _both(own: VehicleAlarm, of_others: VehicleAlarm | None) -> VehicleAlarm:
+    """Neither hides the other; it is the alarm of one's own pair."""
+    return own if of_others is None else own.model_copy(update={"text": f"{own.text} {of_others.text}"})
+
+
+def _of_other_stations(
+    flown: Mapping[int, Flown], elsewhere: Mapping[str, Flown], near: Mapping[Pair, Nearest], now_s: float
+) -> dict[int, VehicleAlarm]:
+    """Of several the nearest is told, and before one that may be anywhere one that is there."""
+    alarms: dict[int, VehicleAlarm] = {}
+    each = [(one, elsewhere[str(other)], at) for (one, other), at in near.items()]
+    for one, other, at in sorted(each, key=lambda it: (not it[1].is_silent, -it[2].distance_m)):
+        alarms[one] = _of_other_station(one, flown[one].name, other, at, now_s)
+    return alarms
 
 
 def _of_other_station(number: int, name: str, other: Flown, at: Nearest, now_s: float) -> VehicleAlarm:
     """That it is heard no more is another alarm than the one before: whoever has seen that has not seen this."""
     if other.is_silent:
         text = f"{other.name} is not heard any more, and may be where {name} flies. {_ALONE}"
-        return VehicleAlarm(kind="near", key=f"near {number} {other.name} silent", text=text)
-    return VehicleAlarm(
-        kind="near", key=f"near {number} {other.name}", text=f"{said(name, other.name, at, now_s)} {_ALONE}"
-    )
+        return VehicleAlarm(kind="near", key=f"near {number} {other.key} silent", text=text)
+    text = f"{said(name, other.name, at, now_s)} {_ALONE}"
+    return VehicleAlarm(kind="near", key=f"near {number} {other.key}", text=text)
 
 
-def found_among(
-    flown: Mapping[int, Flown], now_s: float, elsewhere: Mapping[str, Flown] | None = None
-) -> dict[Pair, Nearest]:
-    """How near each pair comes to each other; without those of other stations that are too far away for any alarm."""
-    others = elsewhere or {}
-    reach_m = {name: _reach_m(of, now_s) for name, of in (*flown.items(), *others.items())}
-    pairs: list[Pair] = [*combinations(sorted(flown), 2)]
-    for one in flown:
-        apart_m = _apart_m(flown[one], list(others.values()))
-        pairs += [
-            (one, other)
-            for other, far_m in zip(others, apart_m, strict=True)
-            if far_m <= _FLAT * (reach_m[one] + reach_m[other]) + OVER_M
-        ]
+def found_among(flown: Mapping[int, Flown], now_s: float) -> dict[Pair, Nearest]:
+    """How near each pair of one's own comes to each other."""
     found: dict[Pair, Nearest] = {}
-    for one, other in pairs:
-        its = others[other] if isinstance(other, str) else flown[other]
-        if (at := near_each_other(flown[one], its, now_s)) is not None:
+    for one, other in combinations(sorted(flown), 2):
+        if (at := near_each_other(flown[one], flown[other], now_s)) is not None:
             found[one, other] = at
+    return found
+
+
+def found_elsewhere(flown: Mapping[int, Flown], now_s: float, others: Mapping[str, Flown]) -> dict[Pair, Nearest]:
+    """How near other stations' come to one's own; without those that are too far away for any alarm."""
+    reach_m = {key: _reach_m(of, now_s) for key, of in others.items()}
+    found: dict[Pair, Nearest] = {}
+    for one, own in flown.items():
+        own_m = _reach_m(own, now_s)
+        for (key, other), far_m in zip(others.items(), _apart_m(own, list(others.values())), strict=True):
+            if far_m > _FLAT * (own_m + reach_m[key]) + OVER_M:
+                continue
+            if (at := near_each_other(own, other, now_s)) is not None:
+                found[one, key] = at
     return found
 
 

@@ -185,7 +185,7 @@ def _flown(other: OtherVehicle, now_s: float) -> Flown:
         v_down_m_s=-up_m_s,
         horizontal_accuracy_m=it.within_m,
     )
-    return Flown(name_of(other), state, None, unsure_m, is_silent)
+    return Flown(name_of(other), state, None, unsure_m, is_silent, f"{other.station} {it.number}")
 
 
 def _doc(other: OtherVehicle, now_s: float) -> OtherVehicleDoc:
