@@ -33,9 +33,9 @@ _log = logging.getLogger(__name__)
 TURN_S, BEACON_S, STATUS_S, AGAIN_S = 0.1, 1.0, 0.5, 1.0
 REOPEN_S, ENDS_EVERY_S = 5.0, 600.0
 _MEANS = "Other stations are neither seen nor told anything. Own vehicles are not affected."
-KNOWS_S = 10.0
-"""Without the server's word for so long this node says nothing: what it said before may be true no more. A server that
-starts again is back sooner."""
+KNOWS_S = 3.0
+"""Without the server's word, which comes five times a second, for so long this node says nothing: what it said before
+may be true no more."""
 
 
 class StationsNode:

@@ -43,6 +43,7 @@ class Other:
         self._replaced_s = self._twice_s = self._hears_us_s = float("-inf")
         self._beacon: BeaconWire | None = None
         self._beacon_came_s = 0.0
+        self._double_run: int | None = None
         self._utc_less_mono_s = 0.0
         self._clocks = Clocks()
         self._vehicles: dict[int, _Heard] = {}
@@ -65,12 +66,12 @@ class Other:
             return
         if run in self._runs_before:
             if now_s - self._replaced_s > _LEFTOVER_S:
-                self._twice_s = now_s
+                self._twice_s, self._double_run = now_s, self._run
             raise StationsError(f"A message came from a process of {self._name} that another one has replaced.")
         if self._run is not None:
             self._runs_before.append(self._run)
             self._replaced_s = now_s
-        self._run, self._beacon = run, None
+        self._run, self._beacon, self._hears_us_s = run, None, float("-inf")
         self._vehicles.clear()
         self._clocks.forget()
 
@@ -91,10 +92,10 @@ class Other:
         self.heard_s, self._heard_utc_s = now_s, now_utc_s
         if back is None:
             return
-        self._hears_us_s = now_s
         stamps = {"left_s": back.sent_us / 1e6, "came_there_s": back.came_us / 1e6, "left_there_s": wire.sent_us / 1e6}
         if not self._clocks.on_exchange(**stamps, came_s=now_s):
             raise StationsError(f"The times that {self._name} tells of an exchange cannot be true.")
+        self._hears_us_s = now_s
 
     def told(self, now_s: float, now_utc_s: float) -> OtherStation:
         compared = self._clocks.now(now_s)
@@ -114,7 +115,9 @@ class Other:
             clock_ahead_s=ahead_s,
             clock_within_s=within_s,
             hears_us=hears_us and not is_lost,
-            is_double=now_s - self._twice_s < _TWICE_S,
+            sent_t_mono_s=self._beacon_sent_s(now_s),
+            is_new=now_s - self._replaced_s < _LEFTOVER_S + 1.0,
+            is_double=now_s - self._twice_s < _TWICE_S or (self._run is not None and self._run == self._double_run),
             text=" ".join(self._words(now_s, is_lost, hears_us, ahead_s, within_s or 0.0)),
         )
 
@@ -127,29 +130,36 @@ class Other:
 
     def _vehicle(self, number: int, now_s: float) -> OtherVehicle:
         heard = self._vehicles[number]
+        if heard.left is None:
+            heard.left = self._left(heard.wire.sent_us, heard.came_s, now_s)
+        run, left, age_s = self._run or 0, heard.left, (heard.wire.age_ms or 0) / 1e3
+        sent_s = None if left is None else left[0]
         if heard.wire.age_ms is None:
-            return OtherVehicle(self._name, vehicle_of(heard.wire, number, None), None, heard.came_s)
-        if heard.left is None:
-            heard.left = self._left(heard, now_s)
-        age_s = heard.wire.age_ms / 1e3
-        if heard.left is None:
-            told = vehicle_of(heard.wire, number, heard.came_s - age_s)
-            return OtherVehicle(self._name, told, None, heard.came_s)
-        oldest_s, likely_s, youngest_s = heard.left
-        told = vehicle_of(heard.wire, number, likely_s - age_s)
-        return OtherVehicle(self._name, told, oldest_s - age_s, heard.came_s, youngest_s - oldest_s)
+            it = vehicle_of(heard.wire, number, None)
+            return OtherVehicle(self._name, it, None, heard.came_s, sent_t_mono_s=sent_s, run=run)
+        if left is None:
+            it = vehicle_of(heard.wire, number, heard.came_s - age_s)
+            return OtherVehicle(self._name, it, None, heard.came_s, run=run)
+        oldest_s, likely_s, youngest_s = left
+        it = vehicle_of(heard.wire, number, likely_s - age_s)
+        return OtherVehicle(self._name, it, oldest_s - age_s, heard.came_s, youngest_s - oldest_s, sent_s, run)
 
-    def _left(self, heard: _Heard, now_s: float) -> tuple[float, float, float] | None:
+    def _beacon_sent_s(self, now_s: float) -> float | None:
+        """At the earliest."""
+        left = None if self._beacon is None else self._left(self._beacon.sent_us, self._beacon_came_s, now_s)
+        return None if left is None else left[0]
+
+    def _left(self, sent_us: int, came_s: float, now_s: float) -> tuple[float, float, float] | None:
         """When it was sent, on our clock: at the earliest, likely, and at the latest."""
         compared = self._clocks.now(now_s)
         if compared is None:
             return None
-        within_s = compared.within_s + DRIFT * (now_s - heard.came_s)
-        left_s = heard.wire.sent_us / 1e6 - compared.theirs_less_ours_s
-        if left_s > heard.came_s + within_s:  # nothing comes before it was sent: one of the clocks stood still
+        within_s = compared.within_s + DRIFT * (now_s - came_s)
+        left_s = sent_us / 1e6 - compared.theirs_less_ours_s
+        if left_s > came_s + within_s:  # nothing comes before it was sent: one of the clocks stood still
             self._clocks.forget()
             return None
-        earliest_s, likely_s, latest_s = (min(heard.came_s, left_s + off_s) for off_s in (-within_s, 0.0, within_s))
+        earliest_s, likely_s, latest_s = (min(came_s, left_s + off_s) for off_s in (-within_s, 0.0, within_s))
         return earliest_s, likely_s, latest_s
 
     def _words(

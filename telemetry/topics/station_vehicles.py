@@ -69,6 +69,10 @@ class OtherVehicle:
     """When its newest message came."""
     unsure_s: float = 0.0
     """So much later than ``oldest_t_mono_s`` its position may be."""
+    sent_t_mono_s: float | None = None
+    """When its newest message was sent, at the earliest; None: the clocks were not compared yet."""
+    run: int = 0
+    """Of the process that told it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +90,12 @@ class OtherStation:
     clock_within_s: float | None = None
     """How wrong that may be."""
     hears_us: bool = False
+    sent_t_mono_s: float | None = None
+    """When its newest beacon was sent, at the earliest; None: the clocks were not compared yet, or there is none."""
+    is_new: bool = False
+    """Its process has only just taken another one's place: whether that one has ended is not known yet."""
     is_double: bool = False
-    """Another process speaks under its name, too, and is not shown."""
+    """Another process spoke under its name, too, and is not shown."""
     text: str = ""
     """What is wrong and what to do; empty: nothing."""
 

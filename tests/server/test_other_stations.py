@@ -57,7 +57,8 @@ def other(
         number, "Wasp", armed=True, in_air=True, position_t_mono_s=was_s, lat_deg=lat_deg, lon_deg=lon_deg,
         alt_amsl_m=500.0, v_enu_m_s=None if east_m_s is None else (east_m_s, 0.0, 0.0),
     )  # fmt: skip
-    return OtherVehicle("Bravo", replace(it, **more), None if age_s is None else was_s, NOW_S, unsure_s)
+    sent_s = None if age_s is None else NOW_S
+    return OtherVehicle("Bravo", replace(it, **more), None if age_s is None else was_s, NOW_S, unsure_s, sent_s)
 
 
 def heard(station: OtherStation, *vehicles: OtherVehicle) -> StationsStatus:
@@ -86,7 +87,14 @@ class Desk:
     def tell(self, *vehicles: OtherVehicle, state: Any = "live", **more: Any) -> None:
         is_live = state == "live"
         station = OtherStation(
-            "Bravo", state, NOW_S, 0.0, len(vehicles), hears_us=is_live, text="" if is_live else "Lost."
+            "Bravo",
+            state,
+            NOW_S,
+            0.0,
+            len(vehicles),
+            hears_us=is_live,
+            sent_t_mono_s=NOW_S,
+            text="" if is_live else "Lost.",
         )
         self.it.on_status(replace(heard(station, *vehicles), **more))
 

@@ -17,7 +17,7 @@ from typing import Any
 
 from server.door.hub import Hub
 from server.flying.apart.nearness import AHEAD_S, STANDS_M_S, STRAIGHT_S, VEER_SHARE, Flown
-from server.flying.apart.others_heard import NODE_SILENT_S, name_of, row_of_others, with_missing
+from server.flying.apart.others_heard import NODE_SILENT_S, is_vague, name_of, row_of_others, with_missing
 from server.heard.node_states import Nodes
 from server.heard.relay import Relay
 from server.schemas import CheckRow, OtherStationDoc, OtherVehicleDoc, StationsMessage
@@ -214,7 +214,9 @@ def _doc(other: OtherVehicle, now_s: float) -> OtherVehicleDoc:
 
 def _words(other: OtherVehicle, age: float | None) -> Iterator[str]:
     it = other.it
-    if it.in_air and age is None:
+    if it.in_air and is_vague(other):
+        yield f"It is in the air, and where is known only to {it.within_m:.0f} m: it is not held apart from yours."
+    elif it.in_air and age is None:
         yield "It is in the air, and where is not known: it is not held apart from yours."
     elif it.in_air and age is not None and age > COUNTS_S:
         yield (

@@ -16,7 +16,13 @@ LISTENED_S = 5.0
 """For so long at least before nobody's word means that nobody flies."""
 NODE_SILENT_S, VEHICLE_SILENT_S = 3.0, 6.0
 """A vehicle that changes nothing is told of every two seconds."""
+MOST_WITHIN_M = 200.0
+"""A position that is not even known to that is none: nobody could be kept clear of it."""
 _AGREE = "Agree with whoever flies there."
+
+
+def is_vague(other: OtherVehicle) -> bool:
+    return other.it.within_m is not None and other.it.within_m > MOST_WITHIN_M
 
 
 def name_of(other: OtherVehicle) -> str:
@@ -24,22 +30,45 @@ def name_of(other: OtherVehicle) -> str:
 
 
 def with_missing(before: StationsStatus | None, status: StationsStatus) -> StationsStatus:
-    """And the stations that are no longer told of, and vehicles as they were last seen in the air: the node may have
-    started again, or the other station, which then knows no place of what it flew."""
+    """And the stations that are no longer told of, and vehicles as they were last heard or seen in the air: the node
+    may have started again, or the other station, which then knows no place of what it flew."""
+    status = replace(status, vehicles=tuple(_placed(other) for other in status.vehicles))
     if before is None:
         return status
-    told = {station.name for station in status.stations}
+    told = {station.name: station for station in status.stations}
     stations = [*status.stations, *(_lost(station) for station in before.stations if station.name not in told)]
     vehicles = {(other.station, other.it.number): other for other in status.vehicles}
     for other in before.vehicles:
         key = other.station, other.it.number
-        if _was_seen_flying(other) and not ((now := vehicles.get(key)) and _says_where(now)):
-            vehicles[key] = other
+        vehicles[key] = _after(other, vehicles.get(key), told.get(other.station))
     return replace(
         status,
         stations=tuple(sorted(stations, key=lambda station: station.name)),
         vehicles=tuple(vehicles[key] for key in sorted(vehicles)),
     )
+
+
+def _placed(other: OtherVehicle) -> OtherVehicle:
+    """Without a place that is known to no better than anywhere around."""
+    if is_vague(other):
+        it = replace(other.it, position_t_mono_s=None, lat_deg=None, lon_deg=None)
+        return replace(other, it=it, oldest_t_mono_s=None)
+    return other
+
+
+def _after(before: OtherVehicle, now: OtherVehicle | None, station: OtherStation | None) -> OtherVehicle:
+    """What is to be taken of a vehicle of which this was known, and that is told now."""
+    if now is None:
+        return before
+    if before.it.in_air:
+        unsettled = station is not None and (station.is_new or station.is_double)
+        if now.run != before.run and unsettled and not now.it.in_air:
+            return before  # perhaps another station's under the same name
+        if not _says_where(now) and not (now.it.in_air and before.it.lat_deg is None):
+            return before
+    if now.it.link == "none" and before.it.link != "none":
+        return replace(now, it=replace(now.it, link="lost"))
+    return now
 
 
 def row_of_others(status: StationsStatus | None, now_s: float) -> CheckRow:
@@ -70,10 +99,6 @@ def _lost(station: OtherStation) -> OtherStation:
     return replace(station, state="lost", hears_us=False, text=station.text if station.state == "lost" else text)
 
 
-def _was_seen_flying(other: OtherVehicle) -> bool:
-    return other.it.in_air and other.it.lat_deg is not None
-
-
 def _says_where(other: OtherVehicle) -> bool:
     """Where it is, or that it stands on the ground: of one that its station hears."""
     return other.it.lat_deg is not None or (other.it.link == "live" and not other.it.in_air)
@@ -86,6 +111,13 @@ def _unheard(station: OtherStation, vehicles: Sequence[OtherVehicle], now_s: flo
         return
     if station.is_double:
         yield f"of two stations called {station.name} one is not heard"
+    elif station.is_new:
+        yield f"{station.name} has only just started again"
+    if station.sent_t_mono_s is None:
+        yield f"the clock of {station.name} is not compared yet, and how old its words are is not known"
+        return
+    if (old_s := now_s - station.sent_t_mono_s) > VEHICLE_SILENT_S:
+        yield f"what {station.name} says comes {old_s:.0f} s late"
     heard = [other for other in vehicles if other.station == station.name]
     if station.vehicles > len(heard):
         yield f"{station.name} has {station.vehicles} vehicles, and {len(heard)} of them are heard"
@@ -94,8 +126,16 @@ def _unheard(station: OtherStation, vehicles: Sequence[OtherVehicle], now_s: flo
 
 
 def _is_unheard(other: OtherVehicle, now_s: float) -> bool:
-    """By its station, or here; one that its station has not connected to (none) is no vehicle yet."""
-    return other.it.link in ("stale", "lost") or now_s - other.heard_t_mono_s > VEHICLE_SILENT_S
+    """By its station, or here; one that its station has never connected to (none) is no vehicle yet.
+
+    Words and positions count at the worse end of their age.
+    """
+    if other.it.link in ("stale", "lost") or other.sent_t_mono_s is None:
+        return True
+    placed_s = other.oldest_t_mono_s
+    if placed_s is None and other.it.position_t_mono_s is not None:
+        return True
+    return now_s - min(other.sent_t_mono_s, other.sent_t_mono_s if placed_s is None else placed_s) > VEHICLE_SILENT_S
 
 
 def _row(state: Literal["accept", "good"], text: str) -> CheckRow:
