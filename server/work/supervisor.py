@@ -133,6 +133,10 @@ class Supervisor:
                 node.keeping = None
             if (spare := _end_spare(node)) is not None:
                 await spare.process.ended()
+            if node.process is None or node.process.has_ended():
+                # Whoever kept it may have been stopped while it was still being taken over.
+                facts = await asyncio.to_thread(running_node, self._runtime_dir, name)
+                node.process = None if facts is None else NodeProcess.adopt(self._runtime_dir, facts)
             if node.process is not None:
                 await node.process.end()
             self._tell(node, "stopped", "", restarts=0)

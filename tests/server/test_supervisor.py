@@ -223,6 +223,29 @@ def test_a_node_taken_over_is_started_again_when_it_dies(folder: Path) -> None:
     run(whole)
 
 
+def test_a_node_that_is_still_being_taken_over_is_stopped(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def whole() -> None:
+        async with supervised(folder) as first:
+            await first.supervisor.start("recorder", [])
+            await first.running("recorder")
+        looks = asyncio.Event()
+
+        async def found(*_: object) -> None:
+            looks.set()
+            await asyncio.Event().wait()
+
+        monkeypatch.setattr(Supervisor, "_found", found)
+        async with supervised(folder) as second:
+            await looks.wait()
+            await second.supervisor.stop("recorder")
+            assert running_node(folder, "recorder") is None
+            state = second.state("recorder")
+            assert state is not None
+            assert state.state == "stopped"
+
+    run(whole)
+
+
 def test_other_arguments_replace_a_node(folder: Path) -> None:
     async def whole() -> None:
         async with supervised(folder) as watched:
