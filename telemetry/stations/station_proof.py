@@ -98,7 +98,7 @@ def _seen_until_utc(router: str, file: Path) -> datetime | None:
     """None: it does not answer, or refuses this station."""
     try:
         return _router_until_utc(router, file)
-    except (OSError, StationsError):
+    except (OSError, EOFError, StationsError):
         return None
 
 
@@ -138,16 +138,25 @@ def _why_not(router: str, file: Path) -> str:
             f"The router at {at} refuses this station's certificate ({reason}): make its file and router.json5 on the "
             "same machine with hedgehop stations, and restart the router."
         )
+    except EOFError:
+        return (
+            f"The router at {at} ends the connection without a word: it refuses this station's certificate, or is no "
+            "router of Zenoh. Make both files on the same machine with hedgehop stations, and restart the router."
+        )
     except socket.gaierror:
         return f"No router answers at {at}: its name is not known here. See that the network leads to it."
     except (OSError, StationsError) as error:
         why = error.what if isinstance(error, StationsError) else error.strerror or str(error)
         return f"No router answers at {at} ({why}). Start it, and see that the network leads to it."
-    return f"No router answers at {at} as Zenoh's does. See that it is one, and that it has the newest router.json5."
+    return (
+        f"The router at {at} answers, but not as Zenoh's does, or not in time. See that it is one, that it and this "
+        "station have the newest files of the same authority, and that its machine is not too busy."
+    )
 
 
 def _router_until_utc(router: str, file: Path) -> datetime:
-    """When the router's certificate ends. Raises OSError, of which those of TLS are some; StationsError."""
+    """When the router's certificate ends. Raises OSError, of which those of TLS are some; StationsError; EOFError: it
+    ends the connection without a word."""
     host, _, port = router.removeprefix("tls/").rpartition(":")
     host = host.strip("[]")
     context = ssl.create_default_context(cadata=read_proof(file).authority_pem.decode())
@@ -158,8 +167,9 @@ def _router_until_utc(router: str, file: Path) -> datetime:
     ):
         shown = wrapped.getpeercert() or {}
         wrapped.settimeout(_REFUSES_S)
-        with contextlib.suppress(TimeoutError):  # it waits for us to speak, and so it has let us in
-            wrapped.recv(1)
+        with contextlib.suppress(TimeoutError):  # it waits for us to speak: it has let us in, or it is slow
+            if not wrapped.recv(1):
+                raise EOFError
         return datetime.fromtimestamp(ssl.cert_time_to_seconds(str(shown["notAfter"])), UTC)
 
 

@@ -6,17 +6,26 @@ import asyncio
 from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
+from unittest.mock import MagicMock
 
 import pytest
 
 from server.door.certificates import CertificateFiles, now_utc
 from server.door.station_files import ROUTER_FILE, write_station_files
+from telemetry.stations import station_proof
 from telemetry.stations.station_proof import Route, ends_soon, why_refused
 from tests.free_ports import free_port
 from tests.telemetry.bus_runs import run, short_folder
 from tests.telemetry.station_fleet import Router
 
 pytestmark = [pytest.mark.xdist_group("real-time"), pytest.mark.slow]
+
+
+@pytest.fixture(autouse=True)
+def _patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy machine is no reason. Zenoh's router ends what does not speak after 10 s: that is not waited for."""
+    monkeypatch.setattr(station_proof, "_ANSWERS_S", 30.0)
+    monkeypatch.setattr(station_proof, "_REFUSES_S", 4.0)
 
 
 def _write(folder: Path, port: int, *, made: timedelta = timedelta(), authority: str = "data") -> Path:
@@ -49,7 +58,7 @@ def test_a_router_that_is_well_refuses_what_is_not_its_own_and_says_why() -> Non
     def ask(folder: Path, port: int) -> None:
         route = Route((f"tls/127.0.0.1:{port}",), folder / "fleet" / "Alpha.pem")
         assert ends_soon(route, now_utc()) == ""
-        assert "as Zenoh's does" in why_refused(route, now_utc())
+        assert "not as Zenoh's does" in why_refused(route, now_utc())
         named = Route((f"tls/localhost:{port}",), route.file)
         assert f"The router's certificate is not for localhost:{port}" in why_refused(named, now_utc())
         # Signed by another authority, and trusting it: each refuses the other.
@@ -67,6 +76,18 @@ def test_a_router_that_is_well_refuses_what_is_not_its_own_and_says_why() -> Non
         assert "its name is not known" in why_refused(Route(("tls/nowhere.invalid:7447",), route.file), now_utc())
 
     _with_router(_write, ask)
+
+
+def test_one_that_ends_the_connection_without_a_word_has_not_let_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tls = MagicMock()
+    tls.wrap_socket.return_value.__enter__.return_value.recv.return_value = b""
+    monkeypatch.setattr(station_proof.ssl, "create_default_context", lambda **_: tls)
+    monkeypatch.setattr(station_proof.socket, "create_connection", MagicMock())
+    route = Route(("tls/127.0.0.1:7447",), _write(tmp_path, 7447) / "Alpha.pem")
+    assert "ends the connection without a word" in why_refused(route, now_utc())
+    assert ends_soon(route, now_utc()) == ""
 
 
 def test_a_routers_certificate_that_ends_is_told_ahead_and_when_it_has_ended() -> None:
