@@ -211,10 +211,24 @@ def test_two_under_one_name_are_told_and_not_mixed() -> None:
     net.run(15.0)
     (bravo,) = here.roster.stations(net.true_s, net.true_s + 1e9)
     assert "Two stations call themselves Bravo" in bravo.text
+    assert bravo.is_double
     assert [other.it.number for other in here.sees(net.true_s)] == [1]
     assert here.roster.refused > 10
     assert "calls itself Bravo, too" in one.roster.leaves_out(net.true_s + one.off_s)
     assert here.roster.leaves_out(net.true_s) == ""
+    # Its silence is no proof that the first one has ended, however long it lasts.
+    net.stations = [here, two]
+    net.run(45.0)
+    (bravo,) = here.roster.stations(net.true_s, net.true_s + 1e9)
+    assert (bravo.is_double, bravo.is_new) == (True, False)
+    # A third process, with which no other one speaks, is alone.
+    two.restart(3)
+    net.run(4.0)
+    (bravo,) = here.roster.stations(net.true_s, net.true_s + 1e9)
+    assert bravo.is_new
+    net.run(32.0)
+    (bravo,) = here.roster.stations(net.true_s, net.true_s + 1e9)
+    assert (bravo.is_double, bravo.is_new, bravo.hears_us) == (False, False, True)
 
 
 def test_what_came_before_is_refused() -> None:
@@ -283,6 +297,22 @@ def test_a_clock_that_stood_still_is_compared_anew() -> None:
     net.run(2.0)
     for other in here.sees(net.true_s):
         assert other.oldest_t_mono_s is None or other.oldest_t_mono_s <= net.true_s - 30.0
+
+
+def test_words_that_come_late_are_told_with_when_they_were_sent() -> None:
+    here, there = Station("Alpha", 0.0), Station("Bravo", 500.0)
+    net = Net([here, there], 6, fastest_s=8.0, slowest_s=8.1)
+    net.run(14.0)
+    (bravo,) = here.roster.stations(net.true_s, 0.0)
+    # An exchange takes two ways: before that nothing is compared, and nobody is known to hear us.
+    assert (bravo.state, bravo.sent_t_mono_s, bravo.hears_us) == ("live", None, False)
+    assert all(other.sent_t_mono_s is None for other in here.sees(net.true_s))
+    net.run(20.0)
+    (bravo,) = here.roster.stations(net.true_s, 0.0)
+    assert (bravo.state, bravo.hears_us) == ("live", True)
+    for sent_s in (bravo.sent_t_mono_s, *(other.sent_t_mono_s for other in here.sees(net.true_s))):
+        assert sent_s is not None
+        assert sent_s <= net.true_s - 8.0
 
 
 def test_a_vehicle_that_stands_is_told_less_often() -> None:
