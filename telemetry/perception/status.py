@@ -139,8 +139,8 @@ def flight_map_status(flight: FlightMap | None) -> FlightMapStatus | None:
 
 
 def full_text(the_map: Any) -> str:
-    """Of a map that takes nothing new."""
+    """Of a map that takes little or nothing new."""
     return (
-        f"The map has reached its memory limit ({the_map.size_bytes / 1e6:,.0f} MB): nothing new is taken into it "
-        f"({the_map.refused_updates:,} left out). Empty it, or allow it more."
+        f"The map has reached its memory limit ({the_map.size_bytes / 1e6:,.0f} MB): little or nothing new is "
+        f"taken into it ({the_map.refused_updates:,} left out). Empty it, or allow it more."
     )

@@ -302,7 +302,7 @@ class PerceptionSettings:
     vision_resolution_m: float = 0.5
     """Of the range finder's map, too."""
     memory_limit_bytes: int = 1_000_000_000
-    """Per map; beyond it the map takes nothing new, and says so."""
+    """Per map; beyond it the map takes little or nothing new, and says so."""
     safety_radius_m: float = 3.0
     """Kept from moving objects, between middles."""
     approach_s: float = 8.0

@@ -93,7 +93,7 @@ export function MapSettings({ settings }: { settings: PerceptionSettings }) {
       </div>
       <p class="hint">
         Other voxels, or another memory, begin a map anew. The range finder's map has the camera's voxels. A
-        full map takes nothing new, and says so. Camera's points: 0 m uses all of them.
+        full map takes little or nothing new, and says so. Camera's points: 0 m uses all of them.
       </p>
       <ErrorBox place={MAP_SETTINGS} />
       <Anew body={differing(wanted, settings)} giveUp={giveUp} />
