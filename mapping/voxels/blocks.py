@@ -87,32 +87,52 @@ def _left_bytes(store):
     return counts[LIMIT_BYTES] - used
 
 
+@njit(cache=True, nogil=True)
+def _more_bytes(store):
+    """What a new block with its first chunk takes of the memory: nothing of what an emptied map has over."""
+    counts = store.counts
+    block = MOST_BLOCK_BYTES if counts[N_BLOCKS] == counts[N_EVER_USED] else 0
+    return block + (CHUNK_BYTES if counts[N_CHUNKS] == counts[N_CHUNKS_EVER_USED] else 0)
+
+
+@njit(cache=True, nogil=True)
+def _take_chunk(store):
+    """Number of a chunk more, all zeros; the memory for it must be left."""
+    counts = store.counts
+    chunk = counts[N_CHUNKS]
+    if chunk < counts[N_CHUNKS_EVER_USED]:
+        store.cells[chunk * PLACES : (chunk + 1) * PLACES] = 0
+    else:
+        counts[N_CHUNKS_EVER_USED] = chunk + 1
+    counts[N_CHUNKS] = chunk + 1
+    return chunk
+
+
 def is_full(store: Store) -> bool:
     """Whether a block with a brick, or a chunk more for one, may find no room."""
-    counts = store.counts.tolist()
-    block = MOST_BLOCK_BYTES if counts[N_BLOCKS] == counts[N_EVER_USED] else 0
-    chunk = CHUNK_BYTES if counts[N_CHUNKS] == counts[N_CHUNKS_EVER_USED] else 0
-    return counts[N_BLOCKS] == len(store.keys) or _left_bytes(store) < block + chunk
+    return bool(store.counts[N_BLOCKS] == len(store.keys) or _left_bytes(store) < _more_bytes(store))
 
 
 @njit(cache=True, nogil=True)
 def find_or_make(store, bx, by, bz):
-    """Number of the block; -1 where it would be a new one and the memory is full."""
+    """Number of the block; -1 where it would be a new one and the memory is full.
+
+    A new one has its first chunk, so that no memory goes into blocks in which nothing finds room.
+    """
     block = find(store, bx, by, bz)
     if block >= 0:
         return block
     counts = store.counts
     block = counts[N_BLOCKS]
-    if block == store.keys.shape[0]:
+    if block == store.keys.shape[0] or _left_bytes(store) < _more_bytes(store):
         return -1
     if block < counts[N_EVER_USED]:
         store.bricks[block, :] = 0
         store.filled[block] = 0
         store.occupied[block] = 0
-    elif _left_bytes(store) < MOST_BLOCK_BYTES:
-        return -1
     else:
         counts[N_EVER_USED] = block + 1
+    store.chunks[block, 0] = _take_chunk(store)
     store.keys[block, 0], store.keys[block, 1], store.keys[block, 2] = bx, by, bz
     store.stamp[block] = 0
     first = counts[TABLE_FIRST]
@@ -168,16 +188,10 @@ def make_brick(store, block, brick):
         return slot
     counts = store.counts
     filled = np.int64(store.filled[block])
-    if filled & (CHUNK - 1) == 0:
-        chunk = counts[N_CHUNKS]
-        if chunk < counts[N_CHUNKS_EVER_USED]:
-            store.cells[chunk * PLACES : (chunk + 1) * PLACES] = 0
-        elif _left_bytes(store) < CHUNK_BYTES:
+    if filled > 0 and filled & (CHUNK - 1) == 0:
+        if counts[N_CHUNKS] == counts[N_CHUNKS_EVER_USED] and _left_bytes(store) < CHUNK_BYTES:
             return 0
-        else:
-            counts[N_CHUNKS_EVER_USED] = chunk + 1
-        counts[N_CHUNKS] = chunk + 1
-        store.chunks[block, filled >> CHUNK_BITS] = chunk
+        store.chunks[block, filled >> CHUNK_BITS] = _take_chunk(store)
     store.filled[block] = filled + 1
     store.bricks[block, brick] = filled + 1
     return filled + 1

@@ -186,6 +186,27 @@ def test_an_emptied_map_has_room_again_in_other_proportions() -> None:
     assert voxels.refused_updates == 0
 
 
+@pytest.mark.parametrize("is_emptied", [False, True])
+def test_a_map_with_little_room_left_has_no_block_without_a_voxel(is_emptied: bool) -> None:
+    """Dense ground first, then points far apart: what is left goes into blocks that hold them."""
+    voxels = VoxelMap(resolution_m=1.0, memory_limit_bytes=1_000_000)
+    whole = np.stack(np.meshgrid(*[np.arange(8) + 0.5] * 3), axis=-1).reshape(-1, 3)
+    if is_emptied:
+        voxels.insert_hits(np.random.default_rng(10).uniform(-3_000.0, 3_000.0, (300, 3)))
+        voxels.clear()
+    for block in range(620):
+        voxels.insert_hits(whole + np.array([8.0 * block, 0.0, 0.0]))
+    assert not voxels.is_full
+    scattered = np.random.default_rng(11).uniform(1e4, 2e4, (400, 3))
+    voxels.insert_hits(scattered)
+    counts = voxels.blocks.counts
+    assert np.all(voxels.blocks.filled[: counts[store.N_BLOCKS]] > 0)
+    assert voxels.is_full
+    kept = int((voxels.probability(scattered) > 0.5).sum())
+    assert kept == counts[store.N_BLOCKS] - 620 > 100
+    assert voxels.refused_updates == 400 - kept
+
+
 @pytest.mark.parametrize("cleared_at", [None, 9, 600])
 def test_nothing_is_lost_while_blocks_move_to_a_larger_table(
     cleared_at: int | None, monkeypatch: pytest.MonkeyPatch
