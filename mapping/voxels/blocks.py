@@ -87,6 +87,11 @@ def _left_bytes(store):
     return counts[LIMIT_BYTES] - used
 
 
+def used_share(store: Store) -> float:
+    """Of the memory for blocks and chunks, 0 to 1: what was ever in use, since the arrays were made."""
+    return 1.0 - float(_left_bytes(store) / store.counts[LIMIT_BYTES])
+
+
 @njit(cache=True, nogil=True)
 def _more_bytes(store):
     """What a new block with its first chunk takes of the memory: nothing of what an emptied map has over."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from mapping.errors import CapacityError
 from mapping.geometry.arrays import F32, F64, I32, I64, Bools
 from mapping.voxels import blocks, query, store
 from mapping.voxels.checks import (
@@ -24,6 +25,9 @@ from mapping.voxels.update import apply_blocks, apply_grid, assign, begin_values
 
 LARGEST_GRID = 512**3
 """Voxels: 134 MB are set aside, of which a scan fills what its rays cross; never more than the map itself may have."""
+USED_AGAIN = 1.0 / 3.0
+"""Of its memory: an emptied map that has no more than that in blocks and chunks holds as much as a new one, whatever
+comes next, known whole or scattered."""
 VOXELS_FOR_A_STEP = 8
 """How many voxels of a grid are looked through in the time that a ray's way across it takes longer without one."""
 
@@ -131,14 +135,16 @@ class VoxelMap:
 
     def probability(self, points_enu: ArrayLike) -> F64:
         """(N,) occupancy of the voxels that points (N, 3) lie in; NaN where never seen."""
-        numbers = self._numbers(points_enu)
-        _, log_odds, _ = query.describe(self._store, np.maximum(numbers, 0))
+        held = self._store  # once: another thread may empty the map meanwhile
+        numbers = self._numbers(held, points_enu)
+        _, log_odds, _ = query.describe(held, np.maximum(numbers, 0))
         return np.where(numbers >= 0, _probability(log_odds), np.nan)
 
     def explained(self, points_enu: ArrayLike) -> Bools:
         """(N,) whether points (N, 3) lie in explained voxels; False where never seen."""
-        numbers = self._numbers(points_enu)
-        _, _, explained = query.describe(self._store, np.maximum(numbers, 0))
+        held = self._store
+        numbers = self._numbers(held, points_enu)
+        _, _, explained = query.describe(held, np.maximum(numbers, 0))
         return explained & (numbers >= 0)
 
     def occupied(self, *, explained: bool | None = None) -> F64:
@@ -149,12 +155,13 @@ class VoxelMap:
         """(N, 3)"""
         mask = store.OCCUPIED if explained is None else store.OCCUPIED | store.EXPLAINED
         value = store.OCCUPIED | (store.EXPLAINED if explained else 0)
-        return query.describe(self._store, query.list_voxels(self._store, mask, value))[0]
+        held = self._store
+        return query.describe(held, query.list_voxels(held, mask, value))[0]
 
     def known(self) -> tuple[I32, F32, Bools]:
         """Keys (N, 3), probability (N,) and explained (N,) of all voxels ever seen."""
-        numbers = query.list_voxels(self._store, store.KNOWN, store.KNOWN)
-        keys, log_odds, explained = query.describe(self._store, numbers)
+        held = self._store
+        keys, log_odds, explained = query.describe(held, query.list_voxels(held, store.KNOWN, store.KNOWN))
         return keys, _probability(log_odds), explained
 
     def changed_since(self, revision: int, *, ever_hit_only: bool = False) -> Changes:
@@ -174,9 +181,25 @@ class VoxelMap:
         return Changes(keys, _probability(log_odds), explained, now, whole)
 
     def clear(self) -> None:
-        """Forgets all voxels and what was refused; the memory is kept for those to come."""
-        blocks.empty(self._store)
+        """Forgets all voxels and what was refused; the memory is there for those to come.
+
+        Blocks and chunks are used again. Where they have more than a third of the memory they might keep what comes
+        next, which may need them in other proportions, from its room: then all arrays are made anew.
+        """
+        if blocks.used_share(self._store) <= USED_AGAIN or not self._begin_anew():
+            blocks.empty(self._store)
         self._emptied_at = self.revision
+
+    def _begin_anew(self) -> bool:
+        """Whether the system gives the memory for it."""
+        try:
+            fresh = store.make_store(self._memory_limit_bytes)
+        except CapacityError:
+            return False
+        begin_values(fresh, self._model)
+        fresh.counts[[store.REVISION, store.LOG_FROM]] = self.revision + 1
+        self._store = fresh
+        return True
 
     def centres(self, keys: ArrayLike) -> F64:
         """(N, 3) of voxels by key (N, 3)."""
@@ -225,8 +248,8 @@ class VoxelMap:
         """The arrays, for kernels of this floor that look things up themselves."""
         return self._store
 
-    def _numbers(self, points_enu: ArrayLike) -> I64:
-        return query.voxels_of(self._store, checked_points(points_enu), self._resolution_m)
+    def _numbers(self, held: store.Store, points_enu: ArrayLike) -> I64:
+        return query.voxels_of(held, checked_points(points_enu), self._resolution_m)
 
     def _grid_around(self, points: F64, origin: F64, reach_m: float) -> Grid:
         """All that can be reached where that is small enough, else the box that these points need; else none."""

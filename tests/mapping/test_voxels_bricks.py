@@ -186,6 +186,30 @@ def test_an_emptied_map_has_room_again_in_other_proportions() -> None:
     assert voxels.refused_updates == 0
 
 
+@pytest.mark.parametrize("before", ["whole", "scattered"])
+@pytest.mark.parametrize("now", ["whole", "scattered"])
+def test_an_emptied_map_holds_as_much_as_a_new_one(before: str, now: str) -> None:
+    """Whatever it was full of: a ball known whole, or scattered points."""
+    side = np.arange(-38, 38) + 0.5
+    ball = np.stack(np.meshgrid(side, side, side), axis=-1).reshape(-1, 3)
+    ball = ball[np.argsort(np.linalg.norm(ball, axis=1))][:200_000]
+    looks = {"whole": ball, "scattered": np.random.default_rng(12).uniform(-3_000.0, 3_000.0, (4_000, 3))}
+    new, emptied = (VoxelMap(resolution_m=1.0, memory_limit_bytes=500_000) for _ in range(2))
+    for share in (0.2, 1.0, 1.0):
+        emptied.insert_hits(looks[before][: int(share * len(looks[before]))])
+        revision = emptied.revision
+        emptied.clear()
+        assert emptied.changed_since(revision).whole
+        assert emptied.revision > revision
+        assert (emptied.voxel_count, emptied.refused_updates, emptied.is_full) == (0, 0, False)
+    new.insert_hits(looks[now])
+    emptied.insert_hits(looks[now])
+    assert new.is_full
+    assert emptied.refused_updates == new.refused_updates > 0
+    assert content(emptied) == content(new)
+    assert emptied.size_bytes <= 500_000
+
+
 @pytest.mark.parametrize("is_emptied", [False, True])
 def test_a_map_with_little_room_left_has_no_block_without_a_voxel(is_emptied: bool) -> None:
     """Dense ground first, then points far apart: what is left goes into blocks that hold them."""
