@@ -81,7 +81,7 @@ def _leave(store, first, block):
 
 
 @njit(cache=True, nogil=True)
-def _left_bytes(store):
+def left_bytes(store):
     counts = store.counts
     used = counts[N_EVER_USED] * MOST_BLOCK_BYTES + counts[N_CHUNKS_EVER_USED] * CHUNK_BYTES
     return counts[LIMIT_BYTES] - used
@@ -89,7 +89,7 @@ def _left_bytes(store):
 
 def used_share(store: Store) -> float:
     """Of the memory for blocks and chunks, 0 to 1: what was ever in use, since the arrays were made."""
-    return 1.0 - float(_left_bytes(store) / store.counts[LIMIT_BYTES])
+    return 1.0 - float(left_bytes(store) / store.counts[LIMIT_BYTES])
 
 
 @njit(cache=True, nogil=True)
@@ -115,7 +115,7 @@ def _take_chunk(store):
 
 def is_full(store: Store) -> bool:
     """Whether a block with a brick, or a chunk more for one, may find no room."""
-    return bool(store.counts[N_BLOCKS] == len(store.keys) or _left_bytes(store) < _more_bytes(store))
+    return bool(store.counts[N_BLOCKS] == len(store.keys) or left_bytes(store) < _more_bytes(store))
 
 
 @njit(cache=True, nogil=True)
@@ -129,7 +129,7 @@ def find_or_make(store, bx, by, bz):
         return block
     counts = store.counts
     block = counts[N_BLOCKS]
-    if block == store.keys.shape[0] or _left_bytes(store) < _more_bytes(store):
+    if block == store.keys.shape[0] or left_bytes(store) < _more_bytes(store):
         return -1
     if block < counts[N_EVER_USED]:
         store.bricks[block, :] = 0
@@ -194,7 +194,7 @@ def make_brick(store, block, brick):
     counts = store.counts
     filled = np.int64(store.filled[block])
     if filled > 0 and filled & (CHUNK - 1) == 0:
-        if counts[N_CHUNKS] == counts[N_CHUNKS_EVER_USED] and _left_bytes(store) < CHUNK_BYTES:
+        if counts[N_CHUNKS] == counts[N_CHUNKS_EVER_USED] and left_bytes(store) < CHUNK_BYTES:
             return 0
         store.chunks[block, filled >> CHUNK_BITS] = _take_chunk(store)
     store.filled[block] = filled + 1

@@ -21,7 +21,7 @@ from mapping.voxels.checks import (
 )
 from mapping.voxels.marks import NO_GRID, Grid, box_around, mark_points
 from mapping.voxels.rays import mark_rays
-from mapping.voxels.update import apply_blocks, apply_grid, assign, begin_values, mark_explained
+from mapping.voxels.update import apply_blocks, apply_grid, assign, begin_values, make_room_for_hits, mark_explained
 
 LARGEST_GRID = 512**3
 """Voxels: 134 MB are set aside, of which a scan fills what its rays cross; never more than the map itself may have."""
@@ -106,6 +106,8 @@ class VoxelMap:
         truths = checked_truths(explained, len(points))
         blocks.begin_scan(self._store)
         n_ends = mark_points(self._store, grid, points, truths, self._resolution_m, origin, reach_m, discretize, ends)
+        if not grid.size_x:
+            make_room_for_hits(self._store)
         reached = mark_rays(self._store, grid, ends, n_ends, self._resolution_m, origin, reach_m)
         if grid.size_x:
             apply_grid(self._store, self._model, grid, reached)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from mapping.voxels.blocks import find_or_make, make_brick, place_in, place_of, voxel_in
+from mapping.voxels.blocks import find_or_make, left_bytes, make_brick, place_in, place_of, voxel_in
 from mapping.voxels.marks import HIT_WORDS, UNEXPLAINED_WORDS
 from mapping.voxels.store import (
     BRICK,
@@ -34,7 +34,11 @@ from mapping.voxels.store import (
     UNEXPLAINED_HIT,
     VALUE,
     VOXELS,
+    WHOLE_BLOCK_BYTES,
 )
+
+EVERY_HIT = np.uint64(HIT * 0x0101010101010101)
+"""Of the eight voxels in a word of a grid."""
 
 
 class Model(NamedTuple):
@@ -221,6 +225,9 @@ def apply_grid(store, model, grid, reached):
     row = grid.size_x >> SIDE_BITS
     # A voxel more on each side: where a ray ends on a border, rounding may lead it across.
     low, high = (reached[0] - 1) >> SIDE_BITS, (reached[1] + 1) >> SIDE_BITS
+    extent = high - low + 1
+    if left_bytes(store) < extent[0] * extent[1] * extent[2] * WHOLE_BLOCK_BYTES:
+        _make_room_for_hits(store, grid, low, high)
     for bz in range(low[2], high[2] + 1):
         for by in range(low[1], high[1] + 1):
             y, z = (by << SIDE_BITS) - grid.y0, (bz << SIDE_BITS) - grid.z0
@@ -228,6 +235,41 @@ def apply_grid(store, model, grid, reached):
                 first = (z * grid.size_y + y) * row + bx - (grid.x0 >> SIDE_BITS)
                 if _take_block(words, first, row, grid.size_y * row, marks):
                     _apply_block(store, model, find_or_make(store, bx, by, bz), marks)
+
+
+@njit(cache=True, nogil=True)
+def _make_room_for_hits(store, grid, low, high):
+    """Makes the bricks with hits of the blocks ``low`` to ``high`` (3,): of a map's last room they come first."""
+    words = grid.marks.view(np.uint64)
+    row = grid.size_x >> SIDE_BITS
+    layer = grid.size_y * row
+    for bz in range(low[2], high[2] + 1):
+        for by in range(low[1], high[1] + 1):
+            y, z = (by << SIDE_BITS) - grid.y0, (bz << SIDE_BITS) - grid.z0
+            for bx in range(low[0], high[0] + 1):
+                first = (z * grid.size_y + y) * row + bx - (grid.x0 >> SIDE_BITS)
+                block = -1
+                for four in range(0, BRICKS, 4):
+                    near = first + 2 * ((four >> 4) * layer + (four >> 2 & 3) * row)
+                    above = near + layer
+                    hits = (words[near] | words[near + row] | words[above] | words[above + row]) & EVERY_HIT
+                    if hits == 0:
+                        continue
+                    if block < 0:
+                        block = find_or_make(store, bx, by, bz)
+                    for n in range(4):
+                        if block >= 0 and hits >> np.uint64(16 * n) & np.uint64(0xFFFF) != 0:
+                            make_brick(store, block, four + n)
+
+
+@njit(cache=True, nogil=True)
+def make_room_for_hits(store):
+    """Makes the bricks with hits in the blocks' pages, before rays take a map's last room for more blocks."""
+    for page in range(store.counts[N_TOUCHED]):
+        for brick in range(BRICKS):
+            word, shift = HIT_WORDS + brick // 8, np.uint64(brick % 8 * 8)
+            if store.marks[page, word] >> shift & np.uint64(0xFF) != 0:
+                make_brick(store, store.touched[page], brick)
 
 
 @njit(cache=True, nogil=True)

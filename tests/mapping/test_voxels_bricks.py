@@ -210,6 +210,23 @@ def test_an_emptied_map_holds_as_much_as_a_new_one(before: str, now: str) -> Non
     assert emptied.size_bytes <= 500_000
 
 
+@pytest.mark.parametrize("largest_grid", [0, 512**3])
+def test_of_the_last_room_of_a_map_hits_come_first(largest_grid: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wall far away, and more to see on the way than there is room for."""
+    monkeypatch.setattr(map_module, "LARGEST_GRID", largest_grid)
+    monkeypatch.setattr(map_module, "VOXELS_FOR_A_STEP", math.inf)
+    rng = np.random.default_rng(3)
+    wall = np.column_stack([rng.normal(60.0, 0.5, 90), rng.uniform(-30.0, 30.0, 90), rng.uniform(0.0, 10.0, 90)])
+    voxels = VoxelMap(resolution_m=1.0, memory_limit_bytes=500_000 if largest_grid else 27_000)
+    if largest_grid:  # the grid is no larger than the map's memory, of which little is left
+        voxels.assign([[-10_000, 8 * block, 0] for block in range(955)], False)
+    voxels.insert(wall, origin_enu=(0.1, 0.2, 5.3), max_range_m=200.0)
+    assert voxels.is_full
+    assert voxels.refused_updates > 0
+    assert (voxels.probability(wall) > 0.5).all()
+    assert_counts_agree(voxels)
+
+
 @pytest.mark.parametrize("is_emptied", [False, True])
 def test_a_map_with_little_room_left_has_no_block_without_a_voxel(is_emptied: bool) -> None:
     """Dense ground first, then points far apart: what is left goes into blocks that hold them."""
