@@ -19,7 +19,7 @@ from mapping.voxels.checks import (
     checked_size,
     checked_truths,
 )
-from mapping.voxels.marks import NO_GRID, Grid, box_around, mark_points
+from mapping.voxels.marks import NO_GRID, Grid, box_around, count_with_key, mark_points
 from mapping.voxels.rays import mark_rays
 from mapping.voxels.update import apply_blocks, apply_grid, assign, begin_values, make_room_for_hits, mark_explained
 
@@ -28,6 +28,8 @@ LARGEST_GRID = 512**3
 USED_AGAIN = 1.0 / 3.0
 """Of its memory: an emptied map that has no more than that in blocks and chunks holds as much as a new one, whatever
 comes next, known whole or scattered."""
+NEED_FADES = 0.98
+"""Of a grid, with each scan that needs less: a large one is given back after about 60 small ones."""
 VOXELS_FOR_A_STEP = 8
 """How many voxels of a grid are looked through in the time that a ray's way across it takes longer without one."""
 
@@ -79,7 +81,7 @@ class VoxelMap:
         self._store = store.make_store(memory_limit_bytes)
         begin_values(self._store, self._model)
         self._resolution_m, self._memory_limit_bytes = float(resolution_m), int(memory_limit_bytes)
-        self._marks = np.zeros(0, np.uint8)
+        self._marks, self._needed = NO_GRID.marks, 0
         self._emptied_at = 0
 
     def insert(
@@ -236,6 +238,11 @@ class VoxelMap:
         return store.used_bytes(self._store)
 
     @property
+    def grid_bytes(self) -> int:
+        """Of the grid that scans are marked in, on top of ``size_bytes``."""
+        return len(self._marks)
+
+    @property
     def is_full(self) -> bool:
         """What is not known yet finds no room any more, at least not everywhere."""
         return blocks.is_full(self._store)
@@ -256,7 +263,11 @@ class VoxelMap:
     def _grid_around(self, points: F64, origin: F64, reach_m: float) -> Grid:
         """All that can be reached where that is small enough, else the box that these points need; else none."""
         grid = self._grid(np.stack([origin - reach_m, origin + reach_m]), math.inf)
-        return grid if grid.size_x else self._grid(box_around(points, origin, reach_m), len(points))
+        if not grid.size_x:
+            grid = self._grid(box_around(points, origin, reach_m), count_with_key(points, self._resolution_m))
+        if not grid.size_x:
+            self._have_marks(0)
+        return grid
 
     def _grid(self, box: F64, rays: float) -> Grid:
         """None where looking through a box costs more than it spares so few ``rays``."""
@@ -265,9 +276,17 @@ class VoxelMap:
         largest = min(LARGEST_GRID, self._memory_limit_bytes)
         if x * y * z > min(largest, VOXELS_FOR_A_STEP * rays * (x + y + z)):
             return NO_GRID
-        if len(self._marks) < x * y * z:
-            self._marks = np.zeros(min(largest, x * y * z * 5 // 4) // 8 * 8, np.uint8)
+        self._have_marks(x * y * z)
         return Grid(self._marks, x, y, *((low - 1) * store.SIDE for low in lowest))
+
+    def _have_marks(self, voxels: int) -> None:
+        """At least so many bytes; at most four times what the last scans needed, more are given back."""
+        self._needed = max(voxels, int(self._needed * NEED_FADES))
+        if voxels <= len(self._marks) <= 4 * self._needed:
+            return
+        self._marks = NO_GRID.marks  # given back before there are new ones
+        largest = min(LARGEST_GRID, self._memory_limit_bytes)
+        self._marks = np.zeros(max(voxels, min(largest, self._needed * 5 // 4)) // 8 * 8, np.uint8)
 
 
 def _probability(log_odds: F32) -> F32:

@@ -62,6 +62,16 @@ def box_around(points, origin, max_range):
 
 
 @njit(cache=True, nogil=True)
+def count_with_key(points, resolution):
+    """How many of ``points`` (N, 3) are finite and near enough for a key: no others have a ray."""
+    scale, n = 1.0 / resolution, 0
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0] * scale, points[i, 1] * scale, points[i, 2] * scale
+        n += abs(x) < LARGEST_KEY and abs(y) < LARGEST_KEY and abs(z) < LARGEST_KEY
+    return n
+
+
+@njit(cache=True, nogil=True)
 def mark_points(store, grid, points, unexplained, resolution, origin, max_range, discretize, ends):
     """Marks the voxels of ``points`` (N, 3) that lie within ``max_range`` of ``origin``; how many ``ends`` there are.
 

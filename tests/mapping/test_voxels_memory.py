@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 
 import numpy as np
@@ -92,6 +93,30 @@ def test_misses_free_a_voxel_also_where_a_full_map_cannot_tell_them_apart() -> N
         voxels.insert(beyond, origin_enu=(0.25, 0.25, 0.25), max_range_m=10.0)
     assert before == pytest.approx(0.7, abs=0.01)
     assert voxels.probability(hit)[0] < 0.5
+
+
+def test_the_grid_of_a_wide_scan_is_given_back_when_scans_are_small_again() -> None:
+    voxels, rng = VoxelMap(resolution_m=0.5), np.random.default_rng(14)
+    wide, small = rng.uniform(-90.0, 90.0, (30_000, 3)), rng.uniform(-4.0, 4.0, (20, 3))
+    voxels.insert(wide, origin_enu=ORIGIN, max_range_m=300.0)
+    largest_bytes = voxels.grid_bytes
+    assert largest_bytes > 360**3
+    sizes = []
+    for _ in range(200):
+        voxels.insert(small, origin_enu=ORIGIN, max_range_m=300.0)
+        sizes.append(voxels.grid_bytes)
+    assert sizes[20] == largest_bytes, "not for a few small ones"
+    assert sizes[-1] < largest_bytes / 4
+    voxels.insert(wide, origin_enu=ORIGIN, max_range_m=300.0)
+    assert voxels.grid_bytes >= 360**3
+
+
+def test_points_that_are_none_need_no_grid() -> None:
+    voxels, points = VoxelMap(resolution_m=0.1), np.full((300_000, 3), math.nan)
+    points[:3] = 46.0 * np.eye(3)
+    voxels.insert(points, origin_enu=(0.0, 0.0, 0.0), max_range_m=120.0)
+    assert voxels.occupied_count == 3
+    assert voxels.grid_bytes == 0
 
 
 def test_what_a_camera_sees_costs_at_most_eight_bytes_a_voxel() -> None:
