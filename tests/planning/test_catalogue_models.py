@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -64,6 +65,26 @@ def test_files_are_opened_judged_and_told(tmp_path: Path) -> None:
     write_raster(tmp_path / "new.tif", FLAT + 2)
     with pytest.raises(RasterError, match="changed"):
         Catalogue(Opened(found.models, (), ()), "again", RasterLimits()).window(0, 0, 16, 16)
+
+
+@pytest.mark.parametrize("document", [False, True])
+def test_any_folder_of_a_terrain_model_says_what_it_is(tmp_path: Path, *, document: bool) -> None:
+    """Newer tiles of the ground alone hid the trees of the surface model."""
+    named = []
+    for kind, year, high_m in (("dtm", 2024, 0.0), ("dsm", 2019, 25.0)):
+        folder = tmp_path / kind / str(year)
+        folder.mkdir(parents=True)
+        write_raster(folder / "tile.tif", FLAT + high_m, tags={"HEDGEHOP_VERTICAL_DATUM": "EGM2008 height"})
+        told = item(folder, "tile.tif", datetime=f"{year}-01-01T00:00:00Z", hedgehop__vertical_rms_m=0.1)
+        named.append({"rel": "item", "href": told.relative_to(tmp_path).as_posix()})
+    catalog = tmp_path / "catalog.json"
+    catalog.write_text(json.dumps({"type": "Catalog", "stac_version": "1.1.0", "id": "all", "links": named}))
+    found = open_models_of(catalog if document else tmp_path)
+    assert [model.file.bounds_m for model in found.models] == [found.bounds_m]
+    assert float(np.nanmin(found.whole().elevation_m)) == 28.0
+    assert sum("terrain model" in out.why for out in found.left_out) == 1
+    with pytest.raises(RasterError, match="terrain model"):
+        open_models_of(tmp_path / "dtm")
 
 
 def test_a_catalogue_of_nothing_that_can_be_used_says_why(tmp_path: Path) -> None:

@@ -22,6 +22,8 @@ class Listed:
 
     path: Path
     told: Told
+    within: str
+    """Its path from the catalogue's folder on, that one's name included: folders may say what it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +138,7 @@ class _Made:
         if before is not None and before.told != item.told:
             self._doubtful.add(path)
             return
-        self.models[path] = Listed(path, item.told)
+        self.models[path] = self._listed(path, item.told)
 
     def add_plain(self, raster: Path) -> None:
         try:
@@ -147,7 +149,7 @@ class _Made:
         if path in self._others and path not in self.models:
             self._left_out.append(LeftOut(raster.name, "An item names it, and not as its one surface model."))
             return
-        self.models.setdefault(path, Listed(path, Told()))
+        self.models.setdefault(path, self._listed(path, Told()))
 
     def listing(self) -> Listing:
         twice = "Two items tell different things of it. Keep the right one."
@@ -155,6 +157,10 @@ class _Made:
         doubtful = [LeftOut(path.name, twice) for path in sorted(in_doubt)]
         kept = (listed for path, listed in sorted(self.models.items()) if path not in in_doubt)
         return Listing(tuple(kept), (*self._left_out, *doubtful))
+
+    def _listed(self, path: Path, told: Told) -> Listed:
+        root = self.root.resolve()
+        return Listed(path, told, (Path(root.name) / path.relative_to(root)).as_posix())
 
     def _leave_out(self, name: str, error: RasterError) -> None:
         self._left_out.append(LeftOut(name, " ".join(part for part in (error.what, error.advice) if part)))

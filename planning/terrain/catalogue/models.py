@@ -98,7 +98,7 @@ def open_models(listing: Listing, declared: Declared, progress: Progress | None)
 
 def _opened(listed: Listed, declared: Declared, progress: Progress | None, notes: list[str]) -> CatalogueModel:
     told, path = listed.told, listed.path
-    if is_terrain(f"{path.parent.name}/{path.name}") or is_terrain(told.name):
+    if is_terrain(listed.within) or is_terrain(told.name):
         raise RasterError(
             "It is a terrain model (DTM) by its name: trees and buildings are missing in it.",
             where=path.name,
