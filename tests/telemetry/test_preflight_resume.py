@@ -48,6 +48,18 @@ def test_over_a_model_that_tells_its_error_the_way_back_is_higher_by_it() -> Non
     assert told.certificate.required_clearance_m == pytest.approx(plain.certificate.required_clearance_m + more_m)
 
 
+def test_where_home_may_stand_lower_the_way_back_is_higher_by_it() -> None:
+    low = mission([(50.0, 150.0, 20.0), (250.0, 200.0, 9.0), (250.0, 150.0, 9.0)])
+    plain = plan_resumption(low, 4, PLAIN, CLEARANCE)
+    heights = PLAIN.elevation_m
+    may_be_lower = replace(PLAIN, lowest_m=heights - np.float32(0.85), seam=np.zeros(heights.shape, np.bool_))
+    found = plan_resumption(low, 4, may_be_lower, CLEARANCE)
+    assert found.needed_m == pytest.approx(plain.needed_m + 0.85, abs=1e-5)
+    assert found.certificate.certified
+    with pytest.raises(NotAllowedError, match=r"Climb to 11\.0 m"):
+        plan_resumption(low, 4, may_be_lower, CLEARANCE, climb_to_m=plain.climb_to_m)
+
+
 def test_the_way_back_at_a_height_of_the_pilots_choice() -> None:
     low = mission([(50.0, 150.0, 20.0), (250.0, 200.0, 5.0), (250.0, 150.0, 5.0)])
     assert plan_resumption(low, 4, PLAIN, CLEARANCE, climb_to_m=15.0).climb_to_m == 15.0

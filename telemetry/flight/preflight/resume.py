@@ -12,6 +12,7 @@ from planning.basics.plan_model import Mission, MissionItem
 from planning.certificate.certificate_model import Certificate, ClearanceParams, with_accuracy
 from planning.certificate.clearance import certify
 from planning.certificate.commands import STRAIGHT, stays
+from planning.certificate.home_stand import ground_at_home, home_stand
 from planning.certificate.pyramid import cells_pyramid
 from planning.certificate.returns import return_altitude
 from planning.formats.commands import has_position
@@ -92,15 +93,18 @@ def plan_resumption(
 
 
 def _heights(mission: Mission, item: MissionItem, dsm: Dsm, clearance: ClearanceParams) -> tuple[float, float]:
-    """Height above home from which the level way to an item is clear, and the item's own."""
-    home, home_alt_m = mission.home, flown_line(mission, dsm).home_alt_dsm_m
+    """Height above home from which the level way to an item is clear wherever home may stand, and the item's own."""
+    home, line = mission.home, flown_line(mission, dsm)
+    home_alt_m = line.home_alt_dsm_m
+    drop_m = home_stand(ground_at_home(dsm, line.home_xy_m, clearance), line, clearance).drop_m
+    drop_m = drop_m if math.isfinite(drop_m) else 0.0  # the certificate refuses ground that is not known
     xy_m = dsm.xy_from_lat_lon(np.array([[item.lat_deg, item.lon_deg], [home.lat_deg, home.lon_deg]]))
     cells = true_cells(dsm, xy_m)
     over_m, home_m = cells.layout.in_frame(xy_m)
     place = np.array([[*over_m, -math.inf]])
     altitude_m, _ = return_altitude(cells_pyramid(cells), place, home_m, clearance.required_clearance_m)
     own_m = item.alt_m - home_alt_m if item.frame in AMSL_FRAMES else item.alt_m
-    return altitude_m - home_alt_m, own_m
+    return altitude_m - home_alt_m + drop_m, own_m
 
 
 def _rest(mission: Mission, number: int, climb_to_m: float) -> Mission:
