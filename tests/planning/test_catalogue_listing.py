@@ -139,7 +139,10 @@ def assets(path: Path, made: dict[str, Any], **document: Any) -> None:
         ({"data": "./a.tif"}, "Terrain model 2019", None),
         ({"data": {"href": "./a.tif", "title": "DTM"}, "dtm": "./b.tif"}, "", None),
         ({"left": "./a.tif", "right": "./b.tif"}, "", None),
-        ({"dsm": "./a.tif", "surface": "./b.tif"}, "", None),
+        ({"dsm": "./a.tif", "surface": "./b.tif"}, "", "a.tif"),
+        ({"data": "./b.tif", "DSM": "./a.tif"}, "", "a.tif"),
+        ({"dsm": "./a.tif", "DSM": "./b.tif"}, "", None),
+        ({"data": "./a.tif", "elevation": "./b.tif"}, "", None),
     ],
 )
 def test_bare_terrain_and_what_else_an_item_names_are_no_surface_models(

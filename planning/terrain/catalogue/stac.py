@@ -26,7 +26,8 @@ MOST_RMS_M = 20.0
 MOST_HORIZONTAL_M = 100.0
 MOST_GSD_M = 100.0
 _ROLES_LEFT_OUT = {"thumbnail", "overview", "visual", "metadata"}
-_SURFACE_KEYS = {"dsm", "surface", "elevation", "data"}
+_SURFACE_KEYS = ({"dsm"}, {"surface", "elevation", "data"})
+"""Of assets: the first, and where none is called so the others."""
 _SURFACE = re.compile(f"surface|{SURFACE.pattern}")
 _ENDINGS = (".tif", ".tiff")
 MOST_ASSETS = 100
@@ -144,8 +145,8 @@ def _rasters(assets: dict[str, _Asset], title: str) -> tuple[tuple[str, ...], tu
     """The one that says by its key that it is the surface model, else all that may be; and all other rasters."""
     rasters = {key: asset for key, asset in assets.items() if asset.href.lower().endswith(_ENDINGS)}
     may_be = [key for key, asset in rasters.items() if not _is_another(key, asset, title)]
-    said = [key for key in may_be if key.lower() in _SURFACE_KEYS]
-    chosen = said if len(said) == 1 else may_be
+    said = [[key for key in may_be if key.lower() in keys] for keys in _SURFACE_KEYS]
+    chosen = next((keys for keys in said if len(keys) == 1), may_be)
     others = (asset.href for key, asset in rasters.items() if key not in chosen)
     return tuple(rasters[key].href for key in chosen), tuple(others)
 
