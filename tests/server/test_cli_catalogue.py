@@ -8,8 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from planning.errors import ParameterError
 from planning.ground.demo_hillside import demo_dsm
 from planning.terrain.geotiff import write_dsm
+from server.cli.shared.options import ModelOptions
+from server.cli.shared.terrain_given import is_catalogue
 from tests.planning.catalogue_samples import item
 from tests.server.cli_runs import hedgehop
 
@@ -59,6 +62,19 @@ def test_a_place_that_no_model_knows_is_refused(maps: Path) -> None:
     run = hedgehop("terrain", "catalogue", maps, "--at", "1,2", "--json")
     assert run.code == 2
     assert "No model of the catalogue knows 1.0000000, 2.0000000" in run.json["error"]["what"]
+
+
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [("https://maps.example/dsm/a.tif", True), ("https://maps.example/dsm/catalog.json", False)],
+)
+def test_no_address_is_a_catalogue(address: str, *, said: bool) -> None:
+    with pytest.raises(ParameterError, match="read from this machine alone"):
+        is_catalogue(Path(address), ModelOptions(catalogue=said))
+
+
+def test_an_address_alone_is_one_model() -> None:
+    assert not is_catalogue(Path("https://maps.example/dsm/a.tif"), ModelOptions())
 
 
 def test_plans_and_certifies_over_a_catalogue(maps: Path, tmp_path: Path) -> None:

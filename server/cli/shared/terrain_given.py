@@ -87,8 +87,15 @@ def read_model(path: Path, timer: StepTimer, options: ModelOptions) -> tuple[Dsm
 
 
 def is_catalogue(path: Path, options: ModelOptions) -> bool:
-    """Whether several models are given: a STAC document, or what is said to be a catalogue."""
-    return not is_address(path) and (options.catalogue or path.suffix.lower() == ".json")
+    """Whether several models are given: a STAC document, or what is said to be a catalogue. No address is one."""
+    several = options.catalogue or path.suffix.lower() == ".json"
+    if several and is_address(path):
+        raise ParameterError(
+            "A catalogue is read from this machine alone, not from a server.",
+            where=path.name,
+            advice="Download its folder and give that with --catalogue, or the address of one GeoTIFF without it.",
+        )
+    return several
 
 
 def share_lines(catalogue: Catalogue, part: Dsm) -> list[str]:
