@@ -137,9 +137,15 @@ class Dsm(SurfaceModel):
         self.elevation_m.flags.writeable = False
         if (self.lowest_m is None) != (self.seam is None):
             raise ParameterError("Of a surface model of several the lowest heights and the seams are given together.")
-        for name, beside in (("Lowest heights", self.lowest_m), ("Seams", self.seam)):
-            if beside is not None and (beside.shape != self.elevation_m.shape or self.source is not None):
+        for name, beside, dtype in (("Lowest heights", self.lowest_m, np.float32), ("Seams", self.seam, np.bool_)):
+            if beside is None:
+                continue
+            if beside.shape != self.elevation_m.shape or self.source is not None:
                 raise ParameterError(f"{name} are {beside.shape}, the grid's own cells {self.elevation_m.shape}.")
+            if beside.dtype != dtype:
+                raise ParameterError(f"{name} are {np.dtype(dtype)}, got {beside.dtype}.")
+        if self.rms_m is not None and not (math.isfinite(self.rms_m) and self.rms_m > 0.0):
+            raise ParameterError(f"A surface model's RMS error is metres above 0, got {self.rms_m:g}.")
 
     @property
     def height_px(self) -> int:

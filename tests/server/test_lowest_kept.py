@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import io
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -15,6 +18,7 @@ from planning.terrain.rasters.header import RasterLimits
 from server.library.terrains import FOLDER, load_terrain, store_terrain
 from telemetry.errors import RecordingError
 from telemetry.recording import carried_ground
+from telemetry.recording.mcap_files.reader import Recording
 from tests.planning.catalogue_samples import in_memory
 
 
@@ -42,6 +46,28 @@ def test_in_a_recording(dsm: Dsm, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(carried_ground, "MOST_BYTES", dsm.elevation_m.nbytes + 1)
     with pytest.raises(RecordingError, match="too large"):
         carried_ground.packed(dsm)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("lowest_m", np.zeros((8, 8))),
+        ("lowest_m", np.full((8, 8), "x")),
+        ("seam", np.ones((8, 8), np.float32)),
+        ("rms_m", np.array(np.nan)),
+        ("rms_m", np.array(-0.1)),
+        ("rms_m", np.array("x")),
+        ("rms_m", np.array([0.1, 0.2])),
+    ],
+)
+def test_a_foreign_recording_with_something_else_is_refused(dsm: Dsm, name: str, value: np.ndarray) -> None:
+    with np.load(io.BytesIO(carried_ground.packed(dsm))) as fields:
+        others = {key: fields[key] for key in fields} | {name: value}
+    out = io.BytesIO()
+    np.savez_compressed(out, **others)
+    recording = cast(Recording, SimpleNamespace(name="flight.mcap", attachment=lambda name: out.getvalue()))
+    with pytest.raises(RecordingError, match="surface model in the recording cannot be read"):
+        carried_ground.carried_ground(recording)
 
 
 def test_in_the_library(dsm: Dsm, tmp_path: Path) -> None:
