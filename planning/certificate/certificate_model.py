@@ -11,6 +11,7 @@ from planning.fence.judge import FenceVerdict
 from planning.margins.budget import ClearanceBudget, Term
 from planning.margins.words import is_by_hand
 from planning.terrain import BOUND_RMS
+from planning.terrain.dsm import SurfaceModel
 
 SET_DOWN_M = 0.1
 """What is planned holds for a vehicle that stands up to so far beside the planned home."""
@@ -39,32 +40,35 @@ class ClearanceParams:
         return 0.0 if self.budget is None else self.budget.value_m("following")
 
     @property
+    def dsm_place_m(self) -> float:
+        """How far from where the surface model shows them things may stand, where it tells that."""
+        return 0.0 if self.budget is None else self.budget.value_m("dsm_place")
+
+    @property
     def fence_margin_m(self) -> float:
         """Kept from a fence: how far the vehicle's outermost point may be beside where it should be."""
         return self.vehicle_radius_m + self.position_error_m + self.following_m
 
 
-def with_accuracy(params: ClearanceParams, rms_m: float | None) -> ClearanceParams:
-    """The same, allowing for no less than the RMS error that a surface model tells; None: it tells none.
+def with_accuracy(params: ClearanceParams, model: SurfaceModel) -> ClearanceParams:
+    """The same, allowing for no less than the errors in height and place that a surface model tells, if it tells any.
 
     A required clearance that was set by hand stays; then it covers less.
     """
     budget = params.budget
-    if budget is None or rms_m is None:
+    if budget is None:
         return params
-    short_m = BOUND_RMS * rms_m - budget.value_m("dsm_accuracy")
-    if short_m <= 0.0:
-        return params
-    grown = _told_by_model(budget, rms_m)
+    grown = budget
+    if model.rms_m is not None:
+        source = f"{BOUND_RMS:g} x RMS error of {model.rms_m:g} m, told with the surface model"
+        grown = grown.with_least(Term("dsm_accuracy", BOUND_RMS * model.rms_m, source))
+    if model.place_m > 0.0:
+        source = "bound of its horizontal error, or the ground that it measured at once: told with the surface model"
+        grown = grown.with_least(Term("dsm_place", model.place_m, source))
     if is_by_hand(budget, params.required_clearance_m):
         return replace(params, budget=grown)
-    return replace(params, budget=grown, required_clearance_m=params.required_clearance_m + short_m)
-
-
-def _told_by_model(budget: ClearanceBudget, rms_m: float) -> ClearanceBudget:
-    source = f"{BOUND_RMS:g} x RMS error of {rms_m:g} m, told with the surface model"
-    told = Term("dsm_accuracy", BOUND_RMS * rms_m, source)
-    return ClearanceBudget(tuple(told if term.code == "dsm_accuracy" else term for term in budget.terms))
+    more_m = grown.total_m - budget.total_m
+    return replace(params, budget=grown, required_clearance_m=params.required_clearance_m + more_m)
 
 
 @dataclass(frozen=True, slots=True)

@@ -79,7 +79,7 @@ def certify(
     a line with a point that is not finite.
     """
     _check(line, params, trend_step_m)
-    params = with_accuracy(params, dsm.rms_m)
+    params = with_accuracy(params, dsm)
     with threads_for(dsm.cells.elevation_m.size):
         certificate = _judged(dsm, dsm if ground is None else ground, line, params, trend_step_m)
     return replace(certificate, assumptions=certificate.assumptions | (assumptions or {}))
@@ -275,7 +275,8 @@ def _assumptions(dsm: Dsm, line: FlownLine, params: ClearanceParams, scale: floa
         ),
         "takeoff_and_landing": "vertical columns, left out of the distances",
         "column_rule": (
-            f"cells within vehicle radius + position error + {params.set_down_m:g} m of home are known, and those"
+            f"cells within vehicle radius + position error + {params.set_down_m + params.dsm_place_m:g} m of home are"
+            " known, and those"
             f" within the vehicle's radius of each other differ by at most {FREE_STEP_M:g} m"
             f" or {FREE_SLOPE:.2f} of their distance"
         ),

@@ -31,7 +31,8 @@ def ground_at_home(ground: SurfaceModel, home_xy_m: tuple[float, float], params:
 def _ground(
     ground: SurfaceModel, xy_m: tuple[float, float], params: ClearanceParams, stands_dsm_m: float | None
 ) -> HomeGround:
-    centre_m, radius_m = params.position_error_m + params.set_down_m, params.vehicle_radius_m
+    centre_m = params.position_error_m + params.set_down_m + params.dsm_place_m
+    radius_m = params.vehicle_radius_m
     return home_ground(
         ground_around(ground, xy_m, centre_m + radius_m),
         xy_m,
@@ -80,7 +81,7 @@ def better_home(
     near, level = nearest_standing(
         ground,
         home_xy_m,
-        centre_m=params.position_error_m + max(params.set_down_m, SET_DOWN_M),
+        centre_m=params.position_error_m + max(params.set_down_m, SET_DOWN_M) + params.dsm_place_m,
         radius_m=params.vehicle_radius_m,
         most_drop_m=most_drop_m,
     )

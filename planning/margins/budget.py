@@ -9,13 +9,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-TermCode = Literal["vehicle_radius", "position_error", "following", "dsm_accuracy", "downwash"]
+TermCode = Literal["vehicle_radius", "position_error", "following", "dsm_accuracy", "dsm_place", "downwash"]
 
 TERM_NAMES: dict[TermCode, str] = {
     "vehicle_radius": "vehicle radius",
     "position_error": "position error",
     "following": "following the line",
     "dsm_accuracy": "accuracy of the surface model",
+    "dsm_place": "place of what the surface model shows",
     "downwash": "rotor downwash",
 }
 """In the order in which a smaller clearance is spent: what ends in a contact first, ground effect last."""
@@ -66,6 +67,14 @@ class ClearanceBudget:
     def with_value(self, code: TermCode, value_m: float) -> ClearanceBudget:
         """The same with another value for one term."""
         return ClearanceBudget(tuple(replace(t, value_m=value_m) if t.code == code else t for t in self.terms))
+
+    def with_least(self, least: Term) -> ClearanceBudget:
+        """The same with this term in the place of a smaller one of its code, or of none."""
+        if any(term.code == least.code and term.value_m >= least.value_m for term in self.terms):
+            return self
+        order = tuple(TERM_NAMES)
+        terms = (*(term for term in self.terms if term.code != least.code), least)
+        return ClearanceBudget(tuple(sorted(terms, key=lambda term: order.index(term.code))))
 
     def uncovered_by(self, required_m: float) -> tuple[Uncovered, ...]:
         """What a required clearance does not cover: it is spent on one term after the other."""

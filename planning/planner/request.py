@@ -63,7 +63,7 @@ class PlanRequest:
 
     def clearance_over(self, model: SurfaceModel) -> ClearanceParams:
         """The same over a surface model, which may tell how exact it is."""
-        return with_accuracy(self.clearance(), model.rms_m)
+        return with_accuracy(self.clearance(), model)
 
 
 def clearance_of_planned(planned: PlannedFor) -> ClearanceParams:

@@ -34,6 +34,8 @@ class SurfaceModel(ABC):
     name: str
     rms_m: float | None
     """RMS error of its heights where it tells one itself: a clearance allows for no less. None: it tells none."""
+    place_m: float
+    """How far from where it shows them things may stand, beside their cells; 0: it tells nothing of it."""
 
     @property
     @abstractmethod
@@ -125,6 +127,7 @@ class Dsm(SurfaceModel):
     seam: Bools | None = None
     """(H, W) where the surface between both is not known, for several models meet; None: nowhere."""
     rms_m: float | None = None
+    place_m: float = 0.0
 
     def __post_init__(self) -> None:
         t = self.transform
@@ -146,6 +149,8 @@ class Dsm(SurfaceModel):
                 raise ParameterError(f"{name} are {np.dtype(dtype)}, got {beside.dtype}.")
         if self.rms_m is not None and not (math.isfinite(self.rms_m) and self.rms_m > 0.0):
             raise ParameterError(f"A surface model's RMS error is metres above 0, got {self.rms_m:g}.")
+        if not (math.isfinite(self.place_m) and self.place_m >= 0.0):
+            raise ParameterError(f"A surface model's horizontal error is metres of 0 or more, got {self.place_m:g}.")
 
     @property
     def height_px(self) -> int:

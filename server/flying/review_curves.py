@@ -78,7 +78,7 @@ def demanded_of(flight: Flight) -> Demanded | None:
     planned = None if flight.mission is None else flight.mission.planned_for
     if planned is None:
         return None
-    params = with_accuracy(clearance_of_planned(planned), flight.dsm.rms_m)
+    params = with_accuracy(clearance_of_planned(planned), flight.dsm)
     return Demanded(params.required_clearance_m, params.following_m)
 
 

@@ -49,6 +49,7 @@ class TerrainManifest(BaseModel):
     of_several: bool = False
     """Whether lowest heights and seams lie beside the heights."""
     rms_m: float | None = None
+    place_m: float = 0.0
 
 
 def store_terrain(
@@ -80,7 +81,8 @@ def store_terrain(
         source = write_cells(folder, dsm.source) if dsm.source else None
         transform = (t.a, t.b, t.c, t.d, t.e, t.f)
         manifest = TerrainManifest(doc=doc, transform=transform, crs_wkt=dsm.crs.to_wkt(), source=source)
-        write_manifest(folder, manifest.model_copy(update={"of_several": dsm.lowest_m is not None, "rms_m": dsm.rms_m}))
+        told = {"of_several": dsm.lowest_m is not None, "rms_m": dsm.rms_m, "place_m": dsm.place_m}
+        write_manifest(folder, manifest.model_copy(update=told))
     return doc
 
 
@@ -99,6 +101,7 @@ def load_terrain(directory: Path) -> Dsm:
         lowest_m=read_array(directory / _LOWEST, shape=shape, dtype=np.float32) if manifest.of_several else None,
         seam=read_array(directory / _SEAM, shape=shape, dtype=np.bool_) if manifest.of_several else None,
         rms_m=manifest.rms_m,
+        place_m=manifest.place_m,
     )
 
 

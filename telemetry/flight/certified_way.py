@@ -104,7 +104,7 @@ def judged_way(
     Raises NotAllowedError, MissionError and ParameterError.
     """
     here, profile = here_of(state, wish, now_s), flown.profile
-    flown = replace(flown, clearance=with_accuracy(flown.clearance, ground.rms_m))
+    flown = replace(flown, clearance=with_accuracy(flown.clearance, ground))
     if not 0.0 < speed_m_s <= profile.max_speed_m_s:
         what = f"{speed_m_s:g} m/s were asked for; the profile's top speed is {profile.max_speed_m_s:g} m/s."
         raise NotAllowedError(what, advice="Give a speed within that.")

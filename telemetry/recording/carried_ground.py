@@ -19,7 +19,7 @@ from telemetry.recording.mcap_files.reader import Recording
 NAME, MEDIA_TYPE = "known_ground.npz", "application/x-npz"
 MOST_BYTES = 2_000_000_000
 """Of heights: a file that says more of itself is not unpacked."""
-_BESIDE = ("lowest_m", "seam", "rms_m")
+_BESIDE = ("lowest_m", "seam", "rms_m", "place_m")
 """Of a surface model of several; others have none of them."""
 _BROKEN = (ValueError, KeyError, OSError, EOFError, TypeError, zipfile.BadZipFile, zlib.error, CRSError, DescribedError)
 
@@ -27,6 +27,8 @@ _BROKEN = (ValueError, KeyError, OSError, EOFError, TypeError, zipfile.BadZipFil
 def packed(dsm: Dsm) -> bytes:
     """The grid as it is, to the last bit. Raises RecordingError when it is too large to be carried."""
     beside = {name: value for name in _BESIDE if (value := getattr(dsm, name)) is not None}
+    if not dsm.place_m:
+        del beside["place_m"]
     if sum(array.nbytes for array in (dsm.elevation_m, dsm.lowest_m, dsm.seam) if array is not None) > MOST_BYTES:
         what = f"A surface model of {dsm.elevation_m.size:,} cells is too large for a recording."
         raise RecordingError(what, advice="Cut it to where the flight is, or leave the recording out.")
@@ -71,4 +73,5 @@ def _unpacked(data: bytes) -> Dsm:
             lowest_m=fields.get("lowest_m"),
             seam=fields.get("seam"),
             rms_m=float(fields["rms_m"]) if "rms_m" in fields else None,
+            place_m=float(fields["place_m"]) if "place_m" in fields else 0.0,
         )

@@ -255,6 +255,29 @@ def test_what_is_cut_down_or_filled_is_so_at_both_ends() -> None:
     np.testing.assert_array_equal(part.seam, dsm.seam[20:50, 50:90])
 
 
+def test_what_may_stand_beside_where_a_model_shows_it_is_kept_clear_of() -> None:
+    """A line 10 m beside a wall was certified on a model that is off by up to 15 m."""
+    heights = np.zeros((120, 120), np.float32)
+    heights[:, 60:65] = 40.0
+    exact = catalogue_of(in_memory(heights, cell_m=1.0, horizontal_m=15.0))
+    off = catalogue_of(replace(exact.models[0], place_m=15.0))
+    assert (off.place_m, off.whole().place_m, off.window(0, 0, 9, 9).place_m) == (15.0, 15.0, 15.0)
+    assert "±15 m in place" in off.models[0].words
+    bound_m = PARAMS.required_clearance_m + 15.0
+    told = with_accuracy(with_accuracy(PARAMS, off), off.whole())
+    assert told.required_clearance_m == pytest.approx(with_accuracy(PARAMS, exact).required_clearance_m + 15.0)
+    for away_m, model, certified in ((10.0, exact, True), (10.0, off, False), (bound_m + 2.0, off, True)):
+        east_m = WEST_M + 60.0 - away_m
+        xy_m = np.array([[east_m, NORTH_M - 90.0], [east_m, NORTH_M - 40.0]])
+        found = certify(model.whole(), line_of(xy_m, np.array([30.0, 30.0]), 0.0), PARAMS)
+        assert found.certified == certified, found.reasons
+    assert found.required_clearance_m == pytest.approx(told.required_clearance_m)
+    assert found.budget is not None
+    assert next(term for term in found.budget.terms if term.code == "dsm_place").value_m == 15.0
+    assert found.home is not None
+    assert found.home.reach_m > 15.0
+
+
 def test_what_the_models_tell_of_their_error_is_demanded_once_and_everywhere() -> None:
     request = PlanRequest(pois=(Poi(0.0, 0.0),), profile=PROFILE)
     model = pair(level(), level(), rms_m=0.5)
@@ -269,7 +292,7 @@ def test_what_the_models_tell_of_their_error_is_demanded_once_and_everywhere() -
     assert told.required_clearance_m == pytest.approx(own.required_clearance_m + more_m)
     assert told.budget is not None
     assert told.budget.total_m == pytest.approx(told.required_clearance_m)
-    assert with_accuracy(told, worse.rms_m) == told
+    assert with_accuracy(told, worse) == told
     # Set by hand it stays, and what it does not cover is told.
     by_hand = replace(request, required_clearance_m=own.required_clearance_m + 0.01).clearance_over(worse)
     assert by_hand.required_clearance_m == pytest.approx(own.required_clearance_m + 0.01)

@@ -87,6 +87,16 @@ def test_any_folder_of_a_terrain_model_says_what_it_is(tmp_path: Path, *, docume
         open_models_of(tmp_path / "dtm")
 
 
+@pytest.mark.parametrize(
+    ("said", "place_m"),
+    [({}, 0.0), ({"hedgehop__horizontal_rms_m": 0.1}, 0.3), ({"gsd": 2.0}, 2.0), ({"gsd": 0.5}, 0.0)],
+)
+def test_what_is_told_of_the_place_counts(tmp_path: Path, said: dict[str, float], place_m: float) -> None:
+    write_raster(tmp_path / "a.tif", FLAT)
+    item(tmp_path, "a.tif", **said)
+    assert open_models_of(tmp_path).place_m == pytest.approx(place_m)
+
+
 def test_a_catalogue_of_nothing_that_can_be_used_says_why(tmp_path: Path) -> None:
     (tmp_path / "broken.tif").write_bytes(b"II*\0 and no more")
     with pytest.raises(RasterError, match=r"no surface model that can be used\. broken\.tif: "):

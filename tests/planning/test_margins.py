@@ -81,7 +81,7 @@ def test_every_term_can_be_set_and_says_where_it_comes_from() -> None:
     assert "4 rotors of 0.254 m carry 2 kg" in measured["downwash"]
 
 
-@given(st.tuples(*5 * [LENGTHS]), st.floats(0.0, 60.0))
+@given(st.tuples(*6 * [LENGTHS]), st.floats(0.0, 60.0))
 def test_a_smaller_clearance_says_all_that_it_leaves_out(values_m: tuple[float, ...], required_m: float) -> None:
     terms = budget(*values_m)
     assert terms.total_m == pytest.approx(sum(values_m))
@@ -90,7 +90,7 @@ def test_a_smaller_clearance_says_all_that_it_leaves_out(values_m: tuple[float, 
 
 
 def test_contact_comes_before_ground_effect() -> None:
-    terms = budget(0.35, 0.1, 1.0, 0.07, 0.5)
+    terms = budget(0.35, 0.1, 1.0, 0.07, 0.0, 0.5)
     assert [(part.code, pytest.approx(part.missing_m)) for part in terms.uncovered_by(1.3)] == [
         ("following", 0.15),
         ("dsm_accuracy", 0.07),
@@ -106,7 +106,7 @@ def test_contact_comes_before_ground_effect() -> None:
 
 
 def test_words_and_json() -> None:
-    terms = budget(0.35, 2.5, 1.1, 0.069, 0.593)
+    terms = budget(0.35, 2.5, 1.1, 0.069, 0.0, 0.593)
     answer = budget_json(terms, 5.0)
     assert answer is not None
     assert (answer["set_by_hand"], answer["uncovered"]) == (True, [])

@@ -26,7 +26,7 @@ from tests.planning.catalogue_samples import in_memory
 def dsm() -> Dsm:
     heights = np.arange(64, dtype=np.float32).reshape(8, 8)
     models = (in_memory(heights, name="new", year=2024), in_memory(heights + 2, rms_m=0.3, east_m=20.0, name="old"))
-    return Catalogue(Opened(models, (), ()), "both", RasterLimits()).whole()
+    return replace(Catalogue(Opened(models, (), ()), "both", RasterLimits()).whole(), place_m=0.6)
 
 
 def same(one: Dsm, other: Dsm) -> bool:
@@ -35,14 +35,19 @@ def same(one: Dsm, other: Dsm) -> bool:
     np.testing.assert_array_equal(one.elevation_m, other.elevation_m)
     np.testing.assert_array_equal(np.asarray(one.lowest_m), other.lowest_m)
     np.testing.assert_array_equal(np.asarray(one.seam), other.seam)
-    return (one.rms_m, one.sha256, one.transform) == (other.rms_m, other.sha256, other.transform)
+    return (one.rms_m, one.place_m, one.sha256, one.transform) == (
+        other.rms_m,
+        other.place_m,
+        other.sha256,
+        other.transform,
+    )
 
 
 def test_in_a_recording(dsm: Dsm, monkeypatch: pytest.MonkeyPatch) -> None:
     assert dsm.rms_m == 0.1
     assert same(dsm, carried_ground._unpacked(carried_ground.packed(dsm)))
-    plain = carried_ground._unpacked(carried_ground.packed(replace(dsm.as_grid(), rms_m=None)))
-    assert (plain.lowest_m, plain.seam, plain.rms_m) == (None, None, None)
+    plain = carried_ground._unpacked(carried_ground.packed(replace(dsm.as_grid(), rms_m=None, place_m=0.0)))
+    assert (plain.lowest_m, plain.seam, plain.rms_m, plain.place_m) == (None, None, None, 0.0)
     monkeypatch.setattr(carried_ground, "MOST_BYTES", dsm.elevation_m.nbytes + 1)
     with pytest.raises(RecordingError, match="too large"):
         carried_ground.packed(dsm)
@@ -57,6 +62,7 @@ def test_in_a_recording(dsm: Dsm, monkeypatch: pytest.MonkeyPatch) -> None:
         ("rms_m", np.array(np.nan)),
         ("rms_m", np.array(-0.1)),
         ("rms_m", np.array("x")),
+        ("place_m", np.array(-1.0)),
         ("rms_m", np.array([0.1, 0.2])),
     ],
 )

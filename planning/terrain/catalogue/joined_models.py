@@ -67,6 +67,7 @@ class Catalogue(SurfaceModel):
         self.crs, self.vertical_datum = best.file.crs, best.vertical_datum
         self.transform, self._shape = _grid_over(opened.models)
         self.rms_m = min((model.rms_m for model in opened.models if model.rms_told), default=None)
+        self.place_m = max(model.place_m for model in opened.models)
         self.sha256 = _digest(self.layers, self.transform)
         self._notes = opened.notes
         self._kept: _Kept | None = None
@@ -108,6 +109,7 @@ class Catalogue(SurfaceModel):
             lowest_m=np.ascontiguousarray(found.lowest_m),
             seam=np.ascontiguousarray(found.seam),
             rms_m=self.rms_m,
+            place_m=self.place_m,
         )
 
     def elevation_at(self, xy_m: F64) -> F64:

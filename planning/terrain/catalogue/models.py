@@ -34,6 +34,9 @@ class CatalogueModel:
     rms_told: bool
     horizontal_m: float
     """Bound of the horizontal error; where nobody told it one cell."""
+    place_m: float = 0.0
+    """How far things may stand beside the cells that show them: the bound that was told, else what was measured at
+    once where that is coarser than its cells."""
     vertical_datum: str | None = None
     """The file's, else its item's, else the one that was declared for those that say none."""
 
@@ -47,7 +50,8 @@ class CatalogueModel:
         """E.g. "flight-7: 2026-05-01, 0.1 m, ±0.2 m"."""
         date = "date unknown" if self.taken_utc is None else f"{self.taken_utc:%Y-%m-%d}"
         error = f"±{self.bound_m:.2g} m" if self.rms_told else f"error unknown, taken as ±{self.bound_m:.2g} m"
-        return f"{self.name}: {date}, {self.resolution_m:.3g} m, {error}"
+        place = f", ±{self.place_m:.2g} m in place" if self.place_m > 0.0 else ""
+        return f"{self.name}: {date}, {self.resolution_m:.3g} m, {error}{place}"
 
     @property
     def order(self) -> tuple[float, ...]:
@@ -121,8 +125,10 @@ def _opened(listed: Listed, declared: Declared, progress: Progress | None, notes
         taken_utc = None
     resolution_m = max(file.resolution_m, told.gsd_m or 0.0)
     horizontal_m = BOUND_RMS * told.horizontal_rms_m if told.horizontal_rms_m else resolution_m
+    place_m = horizontal_m if told.horizontal_rms_m or resolution_m > file.resolution_m else 0.0
     rms_m = told.vertical_rms_m or resolution_m
-    return CatalogueModel(file, name, taken_utc, resolution_m, rms_m, bool(told.vertical_rms_m), horizontal_m, datum)
+    is_told = bool(told.vertical_rms_m)
+    return CatalogueModel(file, name, taken_utc, resolution_m, rms_m, is_told, horizontal_m, place_m, datum)
 
 
 def _file(path: Path, declared: Declared, progress: Progress | None) -> DsmFile:

@@ -32,7 +32,7 @@ class DsmFile(SurfaceModel):
 
     def __init__(self, source: Path | RemoteFile, declared: Declared, progress: Progress | None = None) -> None:
         self._source, self._declared, self._progress = source, declared, progress
-        self.name, self.rms_m = source.name, None
+        self.name, self.rms_m, self.place_m = source.name, None, 0.0
         self._kept: tuple[Pixels, np.ndarray] | None = None
         self._whole: Dsm | None = None
         self._first = read_surface(source, declared, _all_if_small, first=None, progress=progress)

@@ -67,7 +67,7 @@ def plan_resumption(
     ``climb_to_m`` None: as high as needed. Raises NotAllowedError when the way is not clear: with the height
     that would be, if there is one.
     """
-    clearance = with_accuracy(clearance, dsm.rms_m)
+    clearance = with_accuracy(clearance, dsm)
     number = resume_item(mission, broke_off_at)
     item, where = mission.items[number - 1], f"the way from home to item {number}"
     needed_m, own_m = _heights(mission, item, dsm, clearance)
