@@ -22,6 +22,8 @@ _SEA_LEVEL = re.compile(
     r"|\b(ordnance datum newlyn|odn|newlyn|normaal amsterdams peil|australian height datum|ngf-?ign ?69|ign69)\b"
 )
 
+_KNOWN_ELLIPSOID = re.compile(r"\b(wgs[ _-]?(19)?84|grs[ _-]?(19)?80)\b")
+
 
 @lru_cache(maxsize=64)
 def is_amsl(vertical_datum: str | None) -> bool:
@@ -58,6 +60,11 @@ def _registered(name: str) -> bool:
 def datums_differ(one: str | None, other: str | None) -> bool:
     """Whether both are named and name different datums: "NAVD88 height (ftUS)" is that of "NAVD88"."""
     return bool(one and other) and _datum(str(one)) != _datum(str(other))
+
+
+def is_same_ellipsoid(one: str, other: str) -> bool:
+    """Whether both are of an ellipsoid that is named and known: WGS 84 and GRS 80 lie within a millimetre."""
+    return all("ellipsoid" in name.lower() and _KNOWN_ELLIPSOID.search(name.lower()) for name in (one, other))
 
 
 def _datum(name: str) -> str:

@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from affine import Affine
+from pyproj import CRS
 
 from planning.basics.plan_model import PathParams, Poi, SurfaceParams, VehicleProfile
 from planning.certificate.clearance import certify
 from planning.errors import ParameterError, RasterError
 from planning.planner.plan import plan_mission
 from planning.planner.request import PlanRequest
+from planning.terrain.catalogue import models
 from planning.terrain.catalogue.best import seam_m
 from planning.terrain.catalogue.joined_models import Catalogue
 from planning.terrain.catalogue.models import Opened
@@ -140,6 +142,31 @@ def test_models_are_joined_only_in_a_datum_that_both_can_mean(tmp_path: Path, da
     assert len(open_models_of(tmp_path).models) == 1 + joined
     # Who asks may know that two surveys of a site have the same zero.
     assert len(open_models_of(tmp_path, vertical_datum=datum).models) == 2
+
+
+def test_only_ellipsoids_that_are_named_and_known_are_one_datum() -> None:
+    """Bessel's and that of WGS 84 lie hundreds of metres apart."""
+    one, utm, bessel = models._is_one_datum, CRS.from_epsg(32633), CRS.from_epsg(31467)
+    assert one("WGS 84 ellipsoid", "GRS80 ellipsoid", None)
+    assert not one("Bessel 1841 ellipsoid", "WGS 84 ellipsoid", None)
+    assert not one("Bessel 1841 ellipsoid", "WGS 84 ellipsoid", "WGS 84 ellipsoid")
+    assert not one("ETRS89 ellipsoid", "GDA94 ellipsoid", None)
+    assert one("Bessel 1841 ellipsoid", "Bessel 1841 ellipsoid", "Bessel 1841 ellipsoid")
+    assert not one("EGM96 height", "WGS 84 ellipsoid", "EGM96 height")
+    assert models._named("ellipsoid", utm) == "WGS 84 ellipsoid"
+    assert not one(models._named("ellipsoid", bessel), "WGS 84 ellipsoid", None)
+
+
+@pytest.mark.parametrize(("unit", "in_file", "used"), [("ftUS", None, 0), ("m", None, 1), ("ft", "ft", 1)])
+def test_an_item_that_tells_another_unit_than_the_file_leaves_it_out(
+    tmp_path: Path, unit: str, in_file: str | None, used: int
+) -> None:
+    write_raster(tmp_path / "a.tif", FLAT, **({"unit": in_file} if in_file else {}))
+    item(tmp_path, "a.tif", hedgehop__vertical_datum=f"NAVD88 height ({unit})")
+    write_raster(tmp_path / "b.tif", FLAT, tags={"HEDGEHOP_VERTICAL_DATUM": "NAVD88 height"})
+    found = open_models_of(tmp_path)
+    assert [model.name for model in found.models if model.name == "a"] == ["a"] * used
+    assert any("file's own unit is 1 m" in out.why for out in found.left_out) == (not used)
 
 
 def test_cells_of_a_turned_raster_count_where_they_lie(tmp_path: Path) -> None:

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+
+from pyproj import CRS
 
 from planning.errors import MissingCrsError, ParameterError, RasterError
 from planning.terrain import BOUND_RMS
 from planning.terrain.catalogue.listed_models import LeftOut, Listed, Listing
 from planning.terrain.projects import is_terrain
 from planning.terrain.rasters.dsm_file import DsmFile
+from planning.terrain.rasters.georef import metres_in
 from planning.terrain.rasters.reading import Declared, Progress
-from planning.terrain.vertical_datum import datums_differ, is_amsl
+from planning.terrain.vertical_datum import datums_differ, is_amsl, is_same_ellipsoid
 
 GOOD_RMS_M = 0.5
 """Of models at least so exact the newest is the best; of others the most exact."""
@@ -115,6 +119,13 @@ def _opened(listed: Listed, declared: Declared, progress: Progress | None, notes
             where=path.name,
             advice="Correct the one that is wrong.",
         )
+    unit_m = _unit_m(told.vertical_datum)
+    if unit_m is not None and abs(unit_m - file.height_unit_m) > 1e-9:
+        raise RasterError(
+            f"Its item says heights in {told.vertical_datum}, the file's own unit is {file.height_unit_m:g} m.",
+            where=path.name,
+            advice="Write the unit into the file (gdal_edit.py -units), or correct the item.",
+        )
     datum = file.vertical_datum or told.vertical_datum or declared.vertical_datum
     name = told.name or path.stem
     notes += [f"{name}: {note}" for note in file.warnings]
@@ -129,6 +140,12 @@ def _opened(listed: Listed, declared: Declared, progress: Progress | None, notes
     rms_m = told.vertical_rms_m or resolution_m
     is_told = bool(told.vertical_rms_m)
     return CatalogueModel(file, name, taken_utc, resolution_m, rms_m, is_told, horizontal_m, place_m, datum)
+
+
+def _unit_m(datum: str | None) -> float | None:
+    """Metres in the unit that a datum's name ends with, e.g. "NAVD88 height (ftUS)"; None: it names none."""
+    found = re.search(r"\(([^()]*)\)\s*$", datum or "")
+    return None if found is None else metres_in(found[1])
 
 
 def _file(path: Path, declared: Declared, progress: Progress | None) -> DsmFile:
@@ -166,7 +183,7 @@ def _misfit(best: CatalogueModel, other: CatalogueModel, declared: str | None) -
             "Bring it there, heights never lowered: gdalwarp -r max -t_srs CRS."
         )
     one, two = best.vertical_datum, other.vertical_datum
-    if not (_is_shared(one, declared) and _is_shared(two, declared)) or datums_differ(one, two):
+    if not _is_one_datum(*(_named(datum, best.file.crs) for datum in (one, two, declared))):
         return (
             f"Its vertical datum is {two or 'not told'}, that of {best.name} {one or 'not told'}: heights may lie tens "
             "of metres apart. Bring both to one datum, or declare it for all."
@@ -174,9 +191,17 @@ def _misfit(best: CatalogueModel, other: CatalogueModel, declared: str | None) -
     return ""
 
 
-def _is_shared(datum: str | None, declared: str | None) -> bool:
-    """Whether two models that name it mean the same: not so "local" or "unknown", unless who asks says that they do."""
-    if datum is None:
+def _named(datum: str | None, crs: CRS) -> str | None:
+    """An ellipsoid that is not named is that of the reference system."""
+    is_bare = datum is not None and re.fullmatch(r"(above )?(the )?ellipsoid(al)?( heights?)?", datum.strip().lower())
+    return f"{crs.ellipsoid.name} ellipsoid".replace("GRS 1980", "GRS 80") if is_bare and crs.ellipsoid else datum
+
+
+def _is_one_datum(one: str | None, other: str | None, declared: str | None) -> bool:
+    """Whether two models mean the same: not so "local" or "unknown", unless who asks says that they do."""
+    if one is None or other is None:
         return False
-    says_so = declared is not None and not datums_differ(datum, declared)
-    return says_so or is_amsl(datum) or "ellipsoid" in datum.lower()
+    if "ellipsoid" in f"{one} {other}".lower():
+        return is_same_ellipsoid(one, other) or (declared is not None and one == other == declared)
+    says_so = declared is not None and not datums_differ(one, declared) and not datums_differ(other, declared)
+    return not datums_differ(one, other) and (says_so or (is_amsl(one) and is_amsl(other)))

@@ -40,6 +40,8 @@ class DsmFile(SurfaceModel):
         plan = self._first.plan
         self.transform, self._shape = model_grid(plan)
         self.crs, self.vertical_datum, self.sha256 = plan.crs, plan.reference.vertical_datum, self._first.sha256
+        self.height_unit_m = plan.reference.metres_per_height_unit
+        """Metres in the unit of the file's own numbers: those of the model are metres."""
         self.report: ReadReport | None = None
         """Of the whole; None while only parts were read."""
         if self._first.stored is not None:

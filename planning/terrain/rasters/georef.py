@@ -181,6 +181,11 @@ def why_reproject(horizontal: CRS, lon: float, lat: float) -> str | None:
     return f"metres that are {scale:.1%} off on the ground" if scale > SCALE_TOLERANCE else None
 
 
+def metres_in(unit: str) -> float | None:
+    """Of a unit by its name, e.g. "ftUS"; None for one that is not known."""
+    return _UNIT_TAGS_M.get(unit.strip().lower())
+
+
 def unit_m(horizontal: CRS) -> float:
     """Metres in the unit of a map projection's axes."""
     return float(horizontal.axis_info[0].unit_conversion_factor)
