@@ -41,7 +41,7 @@ def test_the_newest_of_good_ones_is_the_best_and_the_most_exact_of_others() -> N
 
 def test_files_are_opened_judged_and_told(tmp_path: Path) -> None:
     write_raster(tmp_path / "new.tif", FLAT)
-    item(tmp_path, "new.tif", name="new", datetime="2026-05-01T10:00:00Z", hedgehop__vertical_rms_m=0.1)
+    item(tmp_path, "new.tif", name="new", datetime="2024-05-01T10:00:00Z", hedgehop__vertical_rms_m=0.1)
     write_raster(tmp_path / "old.tif", FLAT + 1, transform=Affine(1.0, 0.0, WEST_M, 0.0, -1.0, NORTH_M))
     write_raster(tmp_path / "late.tif", FLAT)
     item(tmp_path, "late.tif", datetime="2999-01-01T00:00:00Z", hedgehop__vertical_rms_m=0.6)
@@ -99,6 +99,14 @@ def test_what_is_told_of_the_place_counts(tmp_path: Path, said: dict[str, float]
     assert open_models_of(tmp_path).place_m == pytest.approx(place_m)
 
 
+def test_a_part_that_is_too_large_names_the_model_whose_cells_make_it_so() -> None:
+    coarse, fine = in_memory(FLAT, cell_m=50.0, name="survey"), in_memory(FLAT, cell_m=0.1, east_m=900.0, name="tiny")
+    catalogue = Catalogue(Opened((coarse, fine), (), ()), "maps", RasterLimits(max_px=10_000))
+    with pytest.raises(RasterError) as error:
+        catalogue.window(0, 0, 200, 200)
+    assert error.value.where == "maps, at the cells of its finest model tiny (0.1 m)"
+
+
 def test_a_catalogue_of_nothing_that_can_be_used_says_why(tmp_path: Path) -> None:
     (tmp_path / "broken.tif").write_bytes(b"II*\0 and no more")
     with pytest.raises(RasterError, match=r"no surface model that can be used\. broken\.tif: "):
@@ -110,7 +118,7 @@ def test_what_is_declared_is_of_those_that_say_nothing(tmp_path: Path) -> None:
     write_raster(tmp_path / "own.tif", FLAT, tags={"HEDGEHOP_VERTICAL_DATUM": "ellipsoid"})
     write_raster(tmp_path / "contrary.tif", FLAT, tags={"HEDGEHOP_VERTICAL_DATUM": "ellipsoid"})
     item(tmp_path, "contrary.tif", hedgehop__vertical_datum="EGM96 height")
-    item(tmp_path, "bare.tif", datetime="2026-05-01T10:00:00Z")
+    item(tmp_path, "bare.tif", datetime="2024-05-01T10:00:00Z")
     found = open_models_of(tmp_path, crs="EPSG:32633", vertical_datum="EGM96 height")
     assert [(model.name, model.vertical_datum) for model in found.models] == [("bare", "EGM96 height")]
     assert {out.name for out in found.left_out} == {"own", "contrary.tif"}
@@ -121,7 +129,7 @@ def test_what_is_declared_is_of_those_that_say_nothing(tmp_path: Path) -> None:
 def test_models_whose_datum_nobody_tells_are_not_joined(tmp_path: Path) -> None:
     """One was above the ellipsoid, one above the sea: a plan was certified 28 m below the ground."""
     write_raster(tmp_path / "new.tif", FLAT)
-    item(tmp_path, "new.tif", datetime="2026-05-01T10:00:00Z")
+    item(tmp_path, "new.tif", datetime="2024-05-01T10:00:00Z")
     write_raster(tmp_path / "old.tif", FLAT + 28)
     alone = open_models_of(tmp_path)
     assert [model.name for model in alone.models] == ["new"]
@@ -129,7 +137,7 @@ def test_models_whose_datum_nobody_tells_are_not_joined(tmp_path: Path) -> None:
     assert float(np.nanmax(alone.whole().elevation_m)) == 3.0
     both = open_models_of(tmp_path, vertical_datum="EGM96 height")
     assert [model.name for model in both.models] == ["new", "old"]
-    item(tmp_path, "new.tif", datetime="2026-05-01T10:00:00Z", hedgehop__vertical_datum="EGM96 height")
+    item(tmp_path, "new.tif", datetime="2024-05-01T10:00:00Z", hedgehop__vertical_datum="EGM96 height")
     assert [model.name for model in open_models_of(tmp_path).models] == ["new"]
 
 

@@ -143,7 +143,9 @@ class Catalogue(SurfaceModel):
         reach = math.ceil(farthest_seam_m(self.models) / self.resolution_m) + 2
         around = _wider(rows, reach, self.height_px), _wider(columns, reach, self.width_px)
         shape = around[0].stop - around[0].start, around[1].stop - around[1].start
-        check_pixels(*shape, self._limits.max_px, where=self.name)
+        finest = min(self.models, key=lambda model: model.file.resolution_m)
+        where = f"{self.name}, at the cells of its finest model {finest.name} ({self.resolution_m:.3g} m)"
+        check_pixels(*shape, self._limits.max_px, where=where)
         check_memory(BYTES_PER_PX * shape[0] * shape[1], shape=shape, where=self.name)
         told = watched(self._progress, where=self.name)
         made = surface_of(
