@@ -58,8 +58,9 @@ class VoxelMap:
     ``clamp`` are OctoMap's; a voxel is occupied when its probability is above ``occupied`` (Bigazzi 2022: 0.5).
 
     The map holds ``memory_limit_bytes`` at most. What finds no room is refused and counted; what is known goes on being
-    updated. With ``reach_m`` a resolution at which a quarter of the ball of that radius (what a wide camera sees at
-    once) does not fit is refused with CapacityError, which names the resolution that does.
+    updated. The grid that scans are marked in is not counted in ``size_bytes``: at most as much as the map may hold,
+    and at most 134 MB. With ``reach_m`` a resolution at which a quarter of the ball of that radius (what a wide camera
+    sees at once) does not fit is refused with CapacityError, which names the resolution that does.
 
     Lookups may run in another thread while a scan is put in; changing the map takes one thread at a time, and
     ``changed_since`` counts as changing it.
