@@ -32,13 +32,13 @@ def listed(found: Listing) -> list[str]:
 
 def test_a_folder_lists_all_its_rasters_with_what_is_told_of_them(tmp_path: Path) -> None:
     folder = folder_with(tmp_path, "new.tif", "old.tiff", ".hidden.tif", "100%25.tif")
-    item(folder, "new.tif", name="flight", datetime="2026-05-01T10:00:00Z", hedgehop__vertical_rms_m=0.1, gsd=0.05)
+    item(folder, "new.tif", name="flight", datetime="2024-05-01T10:00:00Z", hedgehop__vertical_rms_m=0.1, gsd=0.05)
     found = listing_of(folder)
     assert listed(found) == ["100%25.tif", "new.tif", "old.tiff"]
     told = {model.path.name: model.told for model in found.models}
     assert (told["new.tif"].name, told["new.tif"].vertical_rms_m, told["new.tif"].gsd_m) == ("flight", 0.1, 0.05)
     assert told["new.tif"].taken_utc is not None
-    assert told["new.tif"].taken_utc.isoformat() == "2026-05-01T10:00:00+00:00"
+    assert told["new.tif"].taken_utc.isoformat() == "2024-05-01T10:00:00+00:00"
     assert told["old.tiff"].vertical_rms_m is None
     assert not found.left_out
 
@@ -196,10 +196,10 @@ def test_documents_that_name_each_other_are_read_once(tmp_path: Path) -> None:
 
 def test_two_items_that_differ_leave_their_raster_out(tmp_path: Path) -> None:
     folder = folder_with(tmp_path, "a.tif")
-    path = item(folder, "a.tif", datetime="2026-05-01T00:00:00Z")
+    path = item(folder, "a.tif", datetime="2024-05-01T00:00:00Z")
     (folder / "again.json").write_text(path.read_text())
     assert listed(listing_of(folder)) == ["a.tif"]
-    (folder / "again.json").write_text(path.read_text().replace("2026", "2025"))
+    (folder / "again.json").write_text(path.read_text().replace("2024", "2025"))
     found = listing_of(folder)
     assert not found.models
     assert "Two items" in found.left_out[0].why
@@ -249,7 +249,7 @@ def mutated(document: Any) -> Iterator[Any]:
 
 def test_mutants_of_an_item_are_listed_inside_or_refused_in_words(tmp_path: Path) -> None:
     folder = folder_with(tmp_path, "a.tif")
-    properties = {"datetime": "2026-05-01T10:00:00Z", "gsd": 0.1, "hedgehop__vertical_rms_m": 0.1}
+    properties = {"datetime": "2024-05-01T10:00:00Z", "gsd": 0.1, "hedgehop__vertical_rms_m": 0.1}
     path = item(folder, "a.tif", **properties)
     listed_count, refused = 0, list[str]()
     for mutant in mutated(json.loads(path.read_text())):
@@ -272,7 +272,7 @@ def test_bytes_of_any_kind_are_refused_in_words(tmp_path: Path, data: bytes, pla
     folder = tmp_path / "maps"
     folder.mkdir(exist_ok=True)
     (folder / "a.tif").write_bytes(b"II*\0")
-    path = item(folder, "a.tif", datetime="2026-05-01T10:00:00Z")
+    path = item(folder, "a.tif", datetime="2024-05-01T10:00:00Z")
     whole = path.read_bytes()
     path.write_bytes(whole[:place] + data + whole[place + cut :])
     try:
