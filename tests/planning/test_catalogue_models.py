@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -93,7 +94,7 @@ def test_any_folder_of_a_terrain_model_says_what_it_is(tmp_path: Path, *, docume
     ("said", "place_m"),
     [({}, 0.0), ({"hedgehop__horizontal_rms_m": 0.1}, 0.3), ({"gsd": 2.0}, 2.0), ({"gsd": 0.5}, 0.0)],
 )
-def test_what_is_told_of_the_place_counts(tmp_path: Path, said: dict[str, float], place_m: float) -> None:
+def test_what_is_told_of_the_place_counts(tmp_path: Path, said: dict[str, Any], place_m: float) -> None:
     write_raster(tmp_path / "a.tif", FLAT)
     item(tmp_path, "a.tif", **said)
     assert open_models_of(tmp_path).place_m == pytest.approx(place_m)
@@ -169,7 +170,8 @@ def test_only_ellipsoids_that_are_named_and_known_are_one_datum() -> None:
 def test_an_item_that_tells_another_unit_than_the_file_leaves_it_out(
     tmp_path: Path, unit: str, in_file: str | None, used: int
 ) -> None:
-    write_raster(tmp_path / "a.tif", FLAT, **({"unit": in_file} if in_file else {}))
+    more: dict[str, Any] = {"unit": in_file} if in_file else {}
+    write_raster(tmp_path / "a.tif", FLAT, **more)
     item(tmp_path, "a.tif", hedgehop__vertical_datum=f"NAVD88 height ({unit})")
     write_raster(tmp_path / "b.tif", FLAT, tags={"HEDGEHOP_VERTICAL_DATUM": "NAVD88 height"})
     found = open_models_of(tmp_path)

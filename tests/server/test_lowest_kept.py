@@ -6,7 +6,7 @@ import io
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -68,7 +68,7 @@ def test_in_a_recording(dsm: Dsm, monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_a_foreign_recording_with_something_else_is_refused(dsm: Dsm, name: str, value: np.ndarray) -> None:
     with np.load(io.BytesIO(carried_ground.packed(dsm))) as fields:
-        others = {key: fields[key] for key in fields} | {name: value}
+        others: dict[str, Any] = {key: fields[key] for key in fields} | {name: value}
     out = io.BytesIO()
     np.savez_compressed(out, **others)
     recording = cast(Recording, SimpleNamespace(name="flight.mcap", attachment=lambda name: out.getvalue()))
