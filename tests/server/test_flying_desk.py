@@ -338,7 +338,7 @@ def test_a_plan_takes_its_fence_along_and_the_next_one_without_takes_it_away(
 
     async def scenario() -> None:
         bench = Bench(made, tmp_path / "onboard.json", lanes)
-        bench.vehicle.parameters |= {"FENCE_ENABLE": 1.0, "FENCE_ACTION": 1.0}
+        bench.vehicle.parameters |= {"FENCE_ENABLE": 1.0, "FENCE_ACTION": 1.0, "FENCE_TYPE": 4.0}
         bench.plan = bench.plan.model_copy(update={"document": fenced})
         bench.vehicle.drops_fences = True
         with pytest.raises(TransferError, match="does not hold the fence that was sent"):
