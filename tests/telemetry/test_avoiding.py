@@ -138,6 +138,8 @@ def test_a_way_home_that_is_too_fast_is_slowed() -> None:
         fastest_m_s = max(fastest_m_s, it.state.ground_speed_m_s or 0.0)
     assert 3.5 < fastest_m_s < 5.0
     assert "Slowed to 4.0 m/s: the radar sees 10 m ahead." in it.texts
+    it.until(lambda: not it.state.armed, 120)
+    assert it.avoiding.slowed_to_m_s is None, "what stands has not been slowed"
 
 
 @pytest.mark.parametrize(("depth_m", "sensor"), [(7.0, "vision"), (10.0, "radar")])

@@ -251,6 +251,8 @@ class Avoiding:
 
     def _on_ground(self, state: VehicleState) -> None:
         self._watch.begin()
+        if not state.armed:
+            self._slowing.forget()
         if not state.armed and (self.is_engaged or self.released):
             self.released = ""
             self.stop()

@@ -30,7 +30,12 @@ class Slowing:
     def on_state(self, state: VehicleState) -> None:
         """Another mode has speeds of its own."""
         if state.mode != self._mode:
-            self._mode, self.asked_m_s, self._asked_s, self.as_late = state.mode, None, -math.inf, False
+            self.forget()
+        self._mode = state.mode
+
+    def forget(self) -> None:
+        """What is flown next is flown at speeds of its own."""
+        self.asked_m_s, self._asked_s, self.as_late = None, -math.inf, False
 
     def look(self, state: VehicleState, largest_m_s: float, now_s: float, *, is_late: bool) -> list[Action]:
         """In a mode that is flown by no pilot."""
