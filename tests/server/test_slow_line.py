@@ -7,8 +7,10 @@ import json
 import socket
 import struct
 import time
+import zlib
 from base64 import b64encode
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 import uvicorn
@@ -23,6 +25,8 @@ from tests.server.running import Running
 
 TEXT = 1
 """The frame's opcode."""
+DEFLATED = 0x40
+"""The frame's first byte has it."""
 MESSAGES = 300
 
 
@@ -79,6 +83,28 @@ def test_the_3d_view_keeps_its_buffers() -> None:
     assert limits["/view/abc/"][1] == 64 * 1024
 
 
+def test_the_stream_goes_deflated_but_for_what_is_too_large(served: Running) -> None:
+    lengths = [1500, 1500, slow_lines.DEFLATED_MAX_BYTES, 1500]
+    with _slow_page(served, "Sec-WebSocket-Extensions: permessage-deflate; client_max_window_bits\r\n") as line:
+        served.on_loop(_publish(served, 0, lengths[0]))
+        inflating = zlib.decompressobj(-15)
+        sizes: dict[int, tuple[bool, int]] = {}
+        for first, payload in _frames(line):
+            is_deflated = bool(first & DEFLATED)
+            text = inflating.decompress(payload + b"\0\0\xff\xff") if is_deflated else payload
+            message: dict[str, Any] = json.loads(text) if first & 0x0F == TEXT else {"type": "control frame"}
+            if message["type"] == "vehicle":
+                number = int(message["now_mono_s"])
+                assert len(message["state"]["mode"]) == lengths[number] + 4
+                sizes[number] = is_deflated, len(payload)
+                if number == 3:
+                    break
+                served.on_loop(_publish(served, number + 1, lengths[number + 1]))
+    assert sizes[2] == (False, pytest.approx(lengths[2], abs=3000))
+    assert sizes[3][0]
+    assert sizes[3][1] < 400
+
+
 async def _accepts(scope: Scope, receive: Receive, send: Send) -> None:
     if scope["type"] == "websocket":
         await send({"type": "websocket.accept"})
@@ -92,7 +118,7 @@ async def _publish(served: Running, number: int, length: int = 1500) -> None:
     served.parts.hub.publish(VehicleMessage(source="live", now_mono_s=float(number), state=state, follow=None))
 
 
-def _slow_page(served: Running) -> socket.socket:
+def _slow_page(served: Running, also: str = "") -> socket.socket:
     line = socket.socket()
     line.settimeout(60)
     line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
@@ -101,7 +127,7 @@ def _slow_page(served: Running) -> socket.socket:
     line.sendall(
         f"GET /ws HTTP/1.1\r\nHost: 127.0.0.1:{served.settings.port}\r\nOrigin: {served.origin}\r\n"
         f"Cookie: {served.cookie}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-        f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n\r\n".encode()
+        f"Sec-WebSocket-Key: {key}\r\nSec-WebSocket-Version: 13\r\n{also}\r\n".encode()
     )
     while not served.parts.hub.session_keys():
         time.sleep(0.01)
@@ -109,7 +135,17 @@ def _slow_page(served: Running) -> socket.socket:
 
 
 def _numbers(line: socket.socket, *, until: int, pause_s: float = 0.0) -> Iterator[int]:
-    """Of the positions that arrive; after every 2 kB the line takes nothing for ``pause_s``."""
+    """Of the positions that arrive."""
+    for first, payload in _frames(line, pause_s):
+        message = json.loads(payload) if first & 0x0F == TEXT else {"type": "control frame"}
+        if message["type"] == "vehicle":
+            yield int(message["now_mono_s"])
+            if message["now_mono_s"] == until:
+                return
+
+
+def _frames(line: socket.socket, pause_s: float = 0.0) -> Iterator[tuple[int, bytes]]:
+    """First byte and payload of each; after every 2 kB the line takes nothing for ``pause_s``."""
     held, is_open = b"", False
     while True:
         part = line.recv(2048)
@@ -118,13 +154,8 @@ def _numbers(line: socket.socket, *, until: int, pause_s: float = 0.0) -> Iterat
         if not is_open and b"\r\n\r\n" in held:
             is_open, held = True, held.partition(b"\r\n\r\n")[2]
         while is_open and (found := _frame(held)) is not None:
-            is_text = held[0] & 0x0F == TEXT
-            payload, held = found
-            message = json.loads(payload) if is_text else {"type": "control frame"}
-            if message["type"] == "vehicle":
-                yield int(message["now_mono_s"])
-                if message["now_mono_s"] == until:
-                    return
+            first, (payload, held) = held[0], found
+            yield first, payload
         time.sleep(pause_s)
 
 

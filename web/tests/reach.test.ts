@@ -85,6 +85,9 @@ describe("how far this page's word reaches", () => {
     expect(late_s.value).toBeNull();
     takeFlying(vehicleMessage({ now_mono_s: 102.2 }), 6500);
     expect(late_s.value).toBe(4);
+    now_ms.value = 15_500;
+    linkStatus.value = { ...linkStatus.value!, received_ms: 15_400 };
+    expect(late_s.value, "what stands here is that old by now").toBe(12);
     link.value = "silent";
     expect(late_s.value).toBeNull();
     forgetClock();

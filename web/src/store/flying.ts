@@ -43,7 +43,8 @@ export type Source = VehicleMessage["source"];
 /** A second more than the link's own limits, for its status comes once a second. */
 const STALE_AFTER_S = 2.5;
 const LOST_AFTER_S = 4.5;
-const SAID_EVERY_S = 1;
+/** The vehicle's state and the link's, at least, while server and line carry them. */
+export const SAID_EVERY_S = 1;
 
 type BySource<T> = Record<Source, Signal<T>>;
 

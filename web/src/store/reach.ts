@@ -1,7 +1,16 @@
 import { computed } from "@preact/signals";
 import { isStale, type Group } from "./ages";
 import { now_ms } from "./clock";
-import { adopted, hasLinkFailed, heard, isLinkDown, notInCharge, overdue_s, type Source } from "./flying";
+import {
+  adopted,
+  hasLinkFailed,
+  heard,
+  isLinkDown,
+  notInCharge,
+  overdue_s,
+  SAID_EVERY_S,
+  type Source,
+} from "./flying";
 import { serverNow_s } from "./server_clock";
 import { link } from "./state";
 
@@ -44,14 +53,18 @@ export const isOld = (source: Source, group: Group): boolean =>
 const LATE_S = 2;
 
 /**
- * How late words of the vehicle come from the server to this page, whole seconds; null: not noticeably. What the newest
- * one took counts, and for how long the link's, which comes every second, has been due.
+ * How late words of the vehicle come from the server to this page, whole seconds; null: not noticeably. They come once a
+ * second at least: what the newest one took counts, how old it is by now, and for how long the link's has been due.
  */
 export const late_s = computed<number | null>(() => {
   if (failed.value !== null) return null;
   const known = heard.live.value;
   const came_s = known && serverNow_s(known.received_ms);
   const took_s = known && came_s !== null ? came_s - known.message.now_mono_s : 0;
-  const seconds = Math.max(took_s, adopted.value === null ? 0 : overdue_s.value);
+  const since_s = known ? Math.max(0, now_ms.value - known.received_ms) / 1000 : 0;
+  const seconds = Math.max(
+    took_s,
+    adopted.value === null ? 0 : Math.max(took_s + since_s - SAID_EVERY_S, overdue_s.value),
+  );
   return seconds < LATE_S ? null : Math.floor(seconds);
 });
