@@ -254,6 +254,7 @@ def test_a_server_that_is_silent_is_said_and_nobody_waits_for_its_answers(
     expect(page.get_by_test_id("link-state")).to_contain_text("silent")
     expect(page.get_by_test_id("safety-why")).to_contain_text("transmitter")
     expect(page.get_by_test_id("link-lost")).to_contain_text("The server is silent")
+    expect(page.get_by_test_id("chip-operator")).to_have_text("Was in charge")
     expect(page.get_by_test_id("chip-link")).to_contain_text("No server")
     expect(page.get_by_test_id("tiles")).to_have_attribute("data-old", "true")
     for command in ("next-upload", "arm", "hold-position", "return-home"):
@@ -263,6 +264,7 @@ def test_a_server_that_is_silent_is_said_and_nobody_waits_for_its_answers(
     expect(page.get_by_test_id("link-state")).to_contain_text("Connected")
     expect(page.get_by_test_id("tiles")).to_have_attribute("data-old", "false")
     expect(page.get_by_test_id("safety-why")).to_have_count(0)
+    expect(page.get_by_test_id("chip-operator")).to_have_text("In charge")
     expect(arm).to_be_enabled()
 
 

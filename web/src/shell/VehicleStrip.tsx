@@ -242,27 +242,32 @@ function takes(holder: string | null, silent: boolean): string {
   return silent ? `Nothing is heard of ${holder}: takes the command` : `Asks ${holder}, who can hand it over`;
 }
 
+/** While the server is not heard somebody else may take the command. */
+function part(mine: boolean, holder: string | null, isKnown: boolean): string {
+  if (mine) return isKnown ? "In charge" : "Was in charge";
+  if (isObserver.value) return "Observer";
+  if (holder) return "Looking on";
+  return isKnown ? "Nobody in charge" : "Nobody was in charge";
+}
+
 function Operator() {
   const { holder, mine, silent, waits } = lease.value;
-  const text = mine
-    ? "In charge"
-    : isObserver.value
-      ? "Observer"
-      : holder
-        ? "Looking on"
-        : "Nobody in charge";
-  const title = holder ? `${holder} is in charge` : "Nobody is in charge";
+  const isKnown = failed.value !== "server";
+  const own = isKnown ? "You command the vehicle" : "Whether you still command the vehicle is not known";
+  const who = `${holder ?? "Nobody"} ${isKnown ? "is" : "was"} in charge`;
   return (
     <div class={mine ? "operator" : "operator looks-on"}>
       <Chip
         icon={mine ? "user" : "eye"}
-        text={text}
-        title={mine ? "You command the vehicle" : title}
+        text={part(mine, holder, isKnown)}
+        title={mine ? own : who}
+        stale={!isKnown}
         testid="chip-operator"
       />
       {!mine && holder && (
         <span class="muted operator-holder">
-          {holder} is in charge{silent ? ", silent" : ""}
+          {who}
+          {silent ? ", silent" : ""}
         </span>
       )}
       {waits && (
