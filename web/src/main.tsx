@@ -22,6 +22,7 @@ import "./styles/dialogs.css";
 import "./styles/account.css";
 import "./styles/stations.css";
 import "./styles/strip.css";
+import "./styles/strip_narrow.css";
 import "./styles/fleet.css";
 import "./styles/hold.css";
 import "./styles/fly.css";
