@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import sys
 from pathlib import Path
 
 # Before any kernel is loaded: workers fill the processors by themselves, and threads of theirs, and of the servers that
@@ -10,6 +11,11 @@ from pathlib import Path
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("NUMBA_NUM_THREADS", "1")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+# Nor does each of the hundreds of processes that tests start compile the whole project's text for itself: what one has
+# compiled the next ones load, also where the environment says that Python keeps none of it.
+if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
+    sys.dont_write_bytecode = False
 
 import pytest
 from hypothesis import HealthCheck, settings
