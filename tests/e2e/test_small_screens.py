@@ -67,33 +67,38 @@ AHEAD = (
 )
 
 
-@pytest.mark.parametrize("size", [(1024, 768), (820, 1180), (390, 844)], ids=lambda size: f"{size[0]}x{size[1]}")
-def test_the_ways_past_it_stand_beside_alert_and_instruments(
-    station: Station, page: Page, size: tuple[int, int]
-) -> None:
+def test_the_ways_past_it_stand_beside_alert_and_instruments(station: Station, page: Page) -> None:
     _with_messages(page, AHEAD)
     visit(page, station)
     page.get_by_test_id("tab-fly").click()
-    page.set_viewport_size({"width": size[0], "height": size[1]})
+    for width, height in ((1024, 768), (820, 1180), (390, 844)):
+        page.set_viewport_size({"width": width, "height": height})
+        cards = page.get_by_test_id("manoeuvres")
+        expect(cards).to_be_in_viewport(ratio=1)
+        expect(page.get_by_test_id("manoeuvre-sidestep")).to_be_in_viewport(ratio=1)
+        expect(page.get_by_test_id("alert-acknowledge")).to_be_in_viewport(ratio=1)
+        one, other = page.evaluate(BOXES, ["manoeuvres", "alert-banner"])
+        assert not _overlap(one, other), width
+        opens_right, polar = page.locator(".drawer-button.right"), page.get_by_test_id("polar")
+        is_drawer = opens_right.is_visible()
+        if is_drawer:
+            expect(polar).not_to_be_in_viewport()
+            opens_right.click()
+        expect(polar).to_be_in_viewport(ratio=1)
+        expect(page.get_by_test_id("panel-right").get_by_test_id("manoeuvres")).to_have_count(0)
+        if is_drawer:
+            opens_right.click()
+            expect(polar).not_to_be_in_viewport()
 
-    cards = page.get_by_test_id("manoeuvres")
-    expect(cards).to_be_in_viewport(ratio=1)
-    expect(page.get_by_test_id("manoeuvre-sidestep")).to_be_in_viewport(ratio=1)
-    expect(page.get_by_test_id("alert-acknowledge")).to_be_in_viewport(ratio=1)
-    one, other = page.evaluate(BOXES, ["manoeuvres", "alert-banner"])
-    assert not _overlap(one, other)
-    opens_right = page.locator(".drawer-button.right")
-    if opens_right.is_visible():
-        opens_right.click()
-    expect(page.get_by_test_id("polar")).to_be_in_viewport(ratio=1)
-    expect(page.get_by_test_id("panel-right").get_by_test_id("manoeuvres")).to_have_count(0)
+
+WIDTHS = (1440, 1180, 1024, 820, 390)
 
 
 def test_nothing_sticks_out_of_panels_and_strip(station: Station, page: Page) -> None:
     _with_messages(page, AHEAD)
     visit(page, station)
     page.get_by_test_id("tab-fly").click()
-    for width in (1440, 1180, 1024, 820, 390):
+    for width in WIDTHS:
         page.set_viewport_size({"width": width, "height": 844})
         for testid in ("chip-mode", "chip-gnss", "chip-battery", "hold-position", "return-home"):
             expect(page.get_by_test_id(testid)).to_be_in_viewport(ratio=1)
@@ -208,53 +213,64 @@ WHO = {
 
 
 @pytest.mark.parametrize("who", WHO)
-@pytest.mark.parametrize("is_server_lost", [False, True], ids=["link", "server"])
 def test_while_something_has_failed_the_bars_stay_readable_at_every_width(
-    station: Station, page: Page, *, is_server_lost: bool, who: str
+    station: Station, page: Page, who: str
 ) -> None:
+    """The link alone, then the server, too."""
     sides = _with_messages(page, (*LOST, *WHO[who]))
     visit(page, station)
     page.get_by_test_id("tab-fly").click()
     expect(page.get_by_test_id("chip-link")).to_contain_text("Link failed")
-    if is_server_lost:
-        page.context.route_web_socket(STREAM, lambda side: side.close(code=4408))
-        sides.pop().close(code=4408)
-        expect(page.get_by_test_id("link-state")).to_contain_text("No connection")
+    _who_is_told(page, who)
     found = {}
-    for width in (1440, 1180, 1024, 820, 390):
-        page.set_viewport_size({"width": width, "height": 844})
-        for bar in (".status-bar", ".vehicle-strip"):
-            if collisions := page.locator(bar).evaluate(COLLISIONS):
-                found[width, bar] = collisions
-        for testid in ("hold-position", "return-home", "safety-why", "loss-acknowledge"):
-            assert page.get_by_test_id(testid).is_visible(), (width, testid)
+    for failed in ("link", "server"):
+        if failed == "server":
+            page.context.route_web_socket(STREAM, lambda side: side.close(code=4408))
+            sides.pop().close(code=4408)
+            expect(page.get_by_test_id("link-state")).to_contain_text("No connection")
+        for width in WIDTHS:
+            page.set_viewport_size({"width": width, "height": 844})
+            for bar in (".status-bar", ".vehicle-strip"):
+                if collisions := page.locator(bar).evaluate(COLLISIONS):
+                    found[failed, width, bar] = collisions
+            for testid in ("hold-position", "return-home", "safety-why", "loss-acknowledge"):
+                assert page.get_by_test_id(testid).is_visible(), (failed, width, testid)
     assert found == {}
 
 
 @pytest.mark.parametrize("late_s", [0.0, 16.0], ids=["now", "late"])
-@pytest.mark.parametrize("who", WHO)
-def test_an_alert_and_who_is_in_charge_cut_no_figure_off(
-    station: Station, page: Page, who: str, *, late_s: float
-) -> None:
+def test_an_alert_and_who_is_in_charge_cut_no_figure_off(station: Station, page: Page, *, late_s: float) -> None:
+    def flies() -> VehicleMessage:
+        at_s = time.monotonic() - late_s
+        state = VehicleState(1, 1, armed=True, mode="BRAKE", heartbeat_t_mono_s=at_s, battery_share=0.87)
+        return VehicleMessage(source="live", now_mono_s=at_s, follow=None, state=state)
+
     at_s = time.monotonic() - late_s
-    state = VehicleState(1, 1, armed=True, mode="BRAKE", heartbeat_t_mono_s=at_s, battery_share=0.87)
-    flies = VehicleMessage(source="live", now_mono_s=at_s, follow=None, state=state)
     link = LinkMessage(link=LinkStatus(at_s, adopted=QUAD, state="live", warnings=("Another station commands it.",)))
     silent = NodesMessage(nodes=[NodeDoc(name="radar", state="silent", restarts=0, text="Nothing is heard of it.")])
-    _with_messages(page, (link, *AHEAD[1:], flies, *LOST[2:4], silent, *WHO[who]))
+    sides = _with_messages(page, (link, *AHEAD[1:], flies(), *LOST[2:4], silent, *WHO["in-charge"]))
     visit(page, station)
     page.get_by_test_id("tab-fly").click()
     expect(page.get_by_test_id("chip-battery")).to_contain_text("87")
-    if late_s:
-        expect(page.get_by_test_id("loss-acknowledge")).to_be_visible()
     found = {}
-    for width in (1440, 1180, 1024, 820, 390):
-        page.set_viewport_size({"width": width, "height": 844})
-        expect(page.get_by_test_id("chip-alert")).to_be_visible()
-        expect(page.get_by_test_id("take-control")).to_have_count(0 if who in {"in-charge", "observer"} else 1)
-        if collisions := page.locator(".vehicle-strip").evaluate(COLLISIONS):
-            found[width] = collisions
+    for who in WHO:
+        for message in (flies(), *WHO[who]):
+            sides[-1].send(message.model_dump_json())
+        _who_is_told(page, who)
+        if late_s:
+            expect(page.get_by_test_id("loss-acknowledge")).to_be_visible()
+        for width in WIDTHS:
+            page.set_viewport_size({"width": width, "height": 844})
+            expect(page.get_by_test_id("chip-alert")).to_be_visible()
+            expect(page.get_by_test_id("take-control")).to_have_count(0 if who in {"in-charge", "observer"} else 1)
+            if collisions := page.locator(".vehicle-strip").evaluate(COLLISIONS):
+                found[who, width] = collisions
     assert found == {}
+
+
+def _who_is_told(page: Page, who: str) -> None:
+    """The page has taken what it was last told of that."""
+    expect(page.get_by_test_id("chip-operator")).to_contain_text(who.replace("-", " ").capitalize())
 
 
 COLLISIONS = """(bar) => {
