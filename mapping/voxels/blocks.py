@@ -34,6 +34,7 @@ from mapping.voxels.store import (
     SCAN,
     TABLE_FIRST,
     VALUE,
+    VOXELS_LOGGED,
     Store,
 )
 
@@ -223,13 +224,21 @@ def begin_scan(store):
     counts = store.counts
     counts[SCAN] += 1
     counts[N_TOUCHED] = 0
+    while counts[N_KNOWN] > VOXELS_LOGGED * (counts[LOG_MASK] + 1) and 2 * (counts[LOG_MASK] + 1) <= store.log.size:
+        _lengthen_log(store)
+
+
+@njit(cache=True, nogil=True)
+def _lengthen_log(store):
+    """To twice its length; what is in it stays."""
+    counts = store.counts
     length = counts[LOG_MASK] + 1
-    if counts[N_KNOWN] <= 4 * length or 2 * length > store.log.size:
-        return
     oldest = max(counts[LOG_FROM], counts[REVISION] - length)
     for revision in range(oldest, counts[REVISION]):
         if revision & length:
-            store.log[length + (revision & (length - 1))] = store.log[revision & (length - 1)]
+            place = revision & (length - 1)
+            store.log[length + place] = store.log[place]
+            store.log_voxels[length + place] = store.log_voxels[place]
     counts[LOG_FROM] = oldest
     counts[LOG_MASK] = 2 * length - 1
 

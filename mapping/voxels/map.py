@@ -19,7 +19,7 @@ from mapping.voxels.checks import (
     checked_size,
     checked_truths,
 )
-from mapping.voxels.marks import NO_GRID, Grid, box_around, count_with_key, mark_points
+from mapping.voxels.marks import NO_GRID, Grid, along, box_around, count_with_key, mark_points
 from mapping.voxels.rays import mark_rays
 from mapping.voxels.update import apply_blocks, apply_grid, assign, begin_values, make_room_for_hits, mark_explained
 
@@ -82,7 +82,7 @@ class VoxelMap:
         self._store = store.make_store(memory_limit_bytes)
         begin_values(self._store, self._model)
         self._resolution_m, self._memory_limit_bytes = float(resolution_m), int(memory_limit_bytes)
-        self._marks, self._needed = NO_GRID.marks, 0
+        self._marks, self._touched, self._needed = NO_GRID.marks, NO_GRID.touched, 0
         self._emptied_at = 0
 
     def insert(
@@ -109,11 +109,11 @@ class VoxelMap:
         truths = checked_truths(explained, len(points))
         blocks.begin_scan(self._store)
         n_ends = mark_points(self._store, grid, points, truths, self._resolution_m, origin, reach_m, discretize, ends)
-        if not grid.size_x:
+        if not len(grid.marks):
             make_room_for_hits(self._store)
-        reached = mark_rays(self._store, grid, ends, n_ends, self._resolution_m, origin, reach_m)
-        if grid.size_x:
-            apply_grid(self._store, self._model, grid, reached)
+        mark_rays(self._store, grid, ends, n_ends, self._resolution_m, origin, reach_m)
+        if len(grid.marks):
+            apply_grid(self._store, self._model, grid)
         else:
             apply_blocks(self._store, self._model)
 
@@ -241,7 +241,7 @@ class VoxelMap:
     @property
     def grid_bytes(self) -> int:
         """Of the grid that scans are marked in, on top of ``size_bytes``."""
-        return len(self._marks)
+        return len(self._marks) + len(self._touched)
 
     @property
     def is_full(self) -> bool:
@@ -264,30 +264,36 @@ class VoxelMap:
     def _grid_around(self, points: F64, origin: F64, reach_m: float) -> Grid:
         """All that can be reached where that is small enough, else the box that these points need; else none."""
         grid = self._grid(np.stack([origin - reach_m, origin + reach_m]), math.inf)
-        if not grid.size_x:
+        if not len(grid.marks):
             grid = self._grid(box_around(points, origin, reach_m), count_with_key(points, self._resolution_m))
-        if not grid.size_x:
+        if not len(grid.marks):
             self._have_marks(0)
         return grid
 
     def _grid(self, box: F64, rays: float) -> Grid:
         """None where looking through a box costs more than it spares so few ``rays``."""
         lowest, highest = np.floor(box / (self._resolution_m * store.SIDE)).astype(np.int64).tolist()
-        x, y, z = (store.SIDE * (high - low + 3) for low, high in zip(lowest, highest, strict=True))
-        largest = min(LARGEST_GRID, self._memory_limit_bytes)
-        if x * y * z > min(largest, VOXELS_FOR_A_STEP * rays * (x + y + z)):
+        x, y, z = (high - low + 3 for low, high in zip(lowest, highest, strict=True))  # in blocks
+        if x * y * z * store.VOXELS > min(self._most_marks, VOXELS_FOR_A_STEP * rays * store.SIDE * (x + y + z)):
             return NO_GRID
-        self._have_marks(x * y * z)
-        return Grid(self._marks, x, y, *((low - 1) * store.SIDE for low in lowest))
+        self._have_marks(x * y * z * store.VOXELS)
+        touched = self._touched[: -(-x * y * z // 8) * 8]
+        places = along(0, x, 1), along(1, y, x), along(2, z, x * y)
+        return Grid(self._marks, touched, *places, *((low - 1) * store.SIDE for low in lowest))
+
+    @property
+    def _most_marks(self) -> int:
+        """So many that they and the blocks' flags fit."""
+        return min(LARGEST_GRID, self._memory_limit_bytes) * store.VOXELS // (store.VOXELS + 1)
 
     def _have_marks(self, voxels: int) -> None:
         """At least so many bytes; at most four times what the last scans needed, more are given back."""
         self._needed = max(voxels, int(self._needed * NEED_FADES))
         if voxels <= len(self._marks) <= 4 * self._needed:
             return
-        self._marks = NO_GRID.marks  # given back before there are new ones
-        largest = min(LARGEST_GRID, self._memory_limit_bytes)
-        self._marks = np.zeros(max(voxels, min(largest, self._needed * 5 // 4)) // 8 * 8, np.uint8)
+        self._marks, self._touched = NO_GRID.marks, NO_GRID.touched  # given back before there are new ones
+        self._marks = np.zeros(max(voxels, min(self._most_marks, self._needed * 5 // 4)) // 8 * 8, np.uint8)
+        self._touched = np.zeros(-(-len(self._marks) // (8 * store.VOXELS)) * 8, np.uint8)
 
 
 def _probability(log_odds: F32) -> F32:

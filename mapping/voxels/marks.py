@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
-from mapping.geometry.arrays import U8
+from mapping.geometry.arrays import I64, U8
 from mapping.voxels.blocks import touch, voxel_in
 from mapping.voxels.store import (
     HIT,
     N_REFUSED,
+    SIDE,
     SIDE_BITS,
     UNEXPLAINED_HIT,
     VOXELS,
@@ -22,6 +24,7 @@ LARGEST_KEY = 1 << 30
 """Farther out keys would not fit in 32 bits."""
 MAX_RANGE_VOXELS = 1 << 15
 """How far a ray may go, as in OctoMap."""
+BLOCK_BITS = 3 * SIDE_BITS
 HIT_WORDS, UNEXPLAINED_WORDS = VOXELS // 64, 2 * VOXELS // 64
 """Where these begin in a page of marks."""
 
@@ -29,21 +32,36 @@ HIT_WORDS, UNEXPLAINED_WORDS = VOXELS // 64, 2 * VOXELS // 64
 class Grid(NamedTuple):
     """A byte for every voxel around the sensor: where the rays of an ordinary scan cross, so that nothing is looked up.
 
-    A scan that is too wide for it (``size_x`` 0) leaves its marks in pages, one per block: slower, the same outcome.
+    A scan that is too wide for it (no ``marks``) leaves its marks in pages, one per block: slower, the same outcome.
     """
 
     marks: U8
-    """MISS, HIT, UNEXPLAINED_HIT at (z * size_y + y) * size_x + x; zeros between scans"""
-    size_x: int
-    """Voxels, a multiple of 8."""
-    size_y: int
+    """MISS, HIT, UNEXPLAINED_HIT of every voxel, block by block and in a block as its voxels are numbered: a brick is
+    a word, what a ray crosses one after the other lies together; zeros between scans"""
+    touched: U8
+    """(blocks, rounded up to a multiple of 8) 1 where any of a block's marks is set; zeros between scans"""
+    at_x: I64
+    """(8 * blocks along x,) where a voxel's mark is: the sum of one number for each of its coordinates in the grid"""
+    at_y: I64
+    at_z: I64
     x0: int
     """Key of its lowest voxel, multiples of 8."""
     y0: int
     z0: int
 
 
-NO_GRID = Grid(np.zeros(0, np.uint8), 0, 0, 0, 0, 0)
+_NOWHERE = np.zeros(0, np.int64)
+NO_GRID = Grid(np.zeros(0, np.uint8), np.zeros(0, np.uint8), _NOWHERE, _NOWHERE, _NOWHERE, 0, 0, 0)
+
+
+@lru_cache(maxsize=24)
+def along(axis: int, blocks: int, stride: int) -> I64:
+    """(8 * blocks,) what each coordinate along an axis adds to a mark's place; ``stride`` blocks from one to the next.
+
+    Within a block as ``voxel_in`` numbers its voxels.
+    """
+    key = np.arange(SIDE * blocks, dtype=np.int64)
+    return (key >> SIDE_BITS) * (stride * VOXELS) | (key & 6) << (2 + 2 * axis) | (key & 1) << axis
 
 
 @njit(cache=True, nogil=True)
@@ -83,7 +101,8 @@ def mark_points(store, grid, points, unexplained, resolution, origin, max_range,
     ox, oy, oz = origin[0], origin[1], origin[2]
     reach_sq = max_range * max_range
     marks, pages, counts = grid.marks, store.marks, store.counts
-    in_grid, wanted = grid.size_x > 0, ends.shape[0] > 0
+    at_x, at_y, at_z = grid.at_x, grid.at_y, grid.at_z
+    in_grid, wanted = marks.size > 0, ends.shape[0] > 0
     one_verdict = unexplained.size == 1
     others = np.empty(points.shape[0] if wanted and discretize else 0, np.int64)
     n_ends, n_others = 0, 0
@@ -93,16 +112,23 @@ def mark_points(store, grid, points, unexplained, resolution, origin, max_range,
         if not (abs(fx) < LARGEST_KEY and abs(fy) < LARGEST_KEY and abs(fz) < LARGEST_KEY):
             continue
         x, y, z = math.floor(fx), math.floor(fy), math.floor(fz)
+        hit = HIT | UNEXPLAINED_HIT if unexplained[0 if one_verdict else i] else HIT
+        # Beyond the grid lies what is beyond the range; negative numbers are large ones.
+        ux, uy, uz = np.uint64(x - grid.x0), np.uint64(y - grid.y0), np.uint64(z - grid.z0)
+        place = np.uint64(0)
+        if ux < np.uint64(at_x.size) and uy < np.uint64(at_y.size) and uz < np.uint64(at_z.size):
+            place = np.uint64(at_x[ux] + at_y[uy] + at_z[uz])
+            if discretize and marks[place] & hit == hit:
+                continue  # one more point in a voxel that has been judged: by its centre, as all of them are
         if discretize:
             px, py, pz = (x + 0.5) * resolution, (y + 0.5) * resolution, (z + 0.5) * resolution
         seen = (px - ox) ** 2 + (py - oy) ** 2 + (pz - oz) ** 2 <= reach_sq
         fresh = True
         if seen:
-            hit = HIT | UNEXPLAINED_HIT if unexplained[0 if one_verdict else i] else HIT
             if in_grid:
-                place = ((z - grid.z0) * grid.size_y + y - grid.y0) * grid.size_x + x - grid.x0
                 fresh = marks[place] & HIT == 0
                 marks[place] |= np.uint8(hit)
+                grid.touched[place >> np.uint64(BLOCK_BITS)] = 1
             else:
                 page = touch(store, x >> SIDE_BITS, y >> SIDE_BITS, z >> SIDE_BITS)
                 if page >= 0:

@@ -11,6 +11,7 @@ from mapping.voxels.blocks import find, place_in, place_of, state_of, voxel_in
 from mapping.voxels.marks import LARGEST_KEY
 from mapping.voxels.store import (
     BRICK,
+    BRICK_BITS,
     BRICKS,
     CELL_EVER_HIT,
     CELL_EXPLAINED,
@@ -81,20 +82,23 @@ def _list_voxels(store, mask, value, found):
 @njit(cache=True, nogil=True)
 def list_changes(store, revision, ever_hit_only):
     """(N,) numbers of the voxels that the log holds since ``revision``, each once, the newest change first."""
-    now = store.counts[REVISION]
-    ring = store.counts[LOG_MASK]
-    found = np.empty(now - revision, np.int64)
+    now, ring, most = store.counts[REVISION], store.counts[LOG_MASK], 0
+    for r in range(revision, now):
+        for i in range(BRICK):
+            most += store.log_voxels[r & ring] >> i & 1
+    found = np.empty(most, np.int64)
     n = 0
     for r in range(now - 1, revision - 1, -1):
-        number = np.int64(store.log[r & ring])
-        block, voxel = number // VOXELS, number % VOXELS
-        place = place_of(store, block, voxel)
-        cell = store.cells[place]
-        if cell & CELL_LISTED or (ever_hit_only and not cell & CELL_EVER_HIT):
-            continue
-        store.cells[place] = cell | CELL_LISTED
-        found[n] = number
-        n += 1
+        first = np.int64(store.log[r & ring]) << BRICK_BITS
+        changed = np.int64(store.log_voxels[r & ring])
+        place = place_of(store, first // VOXELS, first % VOXELS)
+        for i in range(BRICK):
+            cell = store.cells[place + i]
+            if changed >> i & 1 == 0 or cell & CELL_LISTED or (ever_hit_only and not cell & CELL_EVER_HIT):
+                continue
+            store.cells[place + i] = cell | CELL_LISTED
+            found[n] = first + i
+            n += 1
     for i in range(n):
         store.cells[place_of(store, found[i] // VOXELS, found[i] % VOXELS)] &= np.uint16(0xFFFF ^ CELL_LISTED)
     return found[:n]

@@ -40,10 +40,14 @@ N_VALUES, N_PAGES, TABLE_FIRST, LOG_MASK, LOG_FROM = range(9, 14)
 N_CHUNKS, N_CHUNKS_EVER_USED, N_ENTERED, LIMIT_BYTES = range(14, 18)
 
 MAX_BLOCKS = 1 << 23
-"""A voxel's number in the log of changes has 32 bits."""
-MAX_LOG, MIN_LOG = 1 << 22, 1 << 10
-FIRST_LOG = 1 << 18
+"""A brick's number in the log of changes has 32 bits."""
+MAX_LOG, MIN_LOG = 1 << 21, 1 << 9
+FIRST_LOG = 1 << 12
 """It grows with the map, so that a small one has no long one."""
+VOXELS_LOGGED = 8
+"""Known voxels for each place of the log, at most, once it has grown."""
+LOG_BYTES = 5
+"""Of one place."""
 FIRST_TABLE = 1 << 10
 BLOCK_BYTES = BRICKS + 4 * (BRICKS // CHUNK) + 29
 """Of one block in all arrays but the table, the pages of marks and the chunks with its voxels."""
@@ -102,7 +106,9 @@ class Store(NamedTuple):
     """(pages, 24) a bit for each voxel of a scan without a grid: 8 words MISS, 8 HIT, 8 UNEXPLAINED_HIT; zeros between
     scans"""
     log: U32
-    """Ring of LOG_MASK + 1 places: block * 512 + voxel of every change; revision r is written at r & LOG_MASK"""
+    """Ring of LOG_MASK + 1 places: block * 64 + brick of every change; revision r is written at r & LOG_MASK"""
+    log_voxels: U8
+    """Beside it, a bit for each voxel of the brick that changed then"""
     counts: I64
 
 
@@ -113,12 +119,12 @@ def blocks_that_fit(memory_limit_bytes: int) -> int:
 
 def room_bytes(memory_limit_bytes: int) -> int:
     """For blocks and chunks; the different log-odds, 74 kB where a map has all it can tell apart, come on top."""
-    return memory_limit_bytes - 4 * log_length(memory_limit_bytes)
+    return memory_limit_bytes - LOG_BYTES * log_length(memory_limit_bytes)
 
 
 def log_length(memory_limit_bytes: int) -> int:
-    """At most: a power of two; at most a sixteenth of the memory."""
-    entries = max(MIN_LOG, min(MAX_LOG, memory_limit_bytes // 64))
+    """At most: a power of two; at most a thirty-second of the memory."""
+    entries = max(MIN_LOG, min(MAX_LOG, memory_limit_bytes // (32 * LOG_BYTES)))
     return 1 << (entries.bit_length() - 1)
 
 
@@ -145,6 +151,7 @@ def make_store(memory_limit_bytes: int) -> Store:
             touched=np.zeros(blocks, np.int32),
             marks=np.zeros((blocks, PAGE_WORDS), np.uint64),
             log=np.zeros(longest_log, np.uint32),
+            log_voxels=np.zeros(longest_log, np.uint8),
             counts=np.zeros(18, np.int64),
         )
     except MemoryError:
@@ -165,7 +172,7 @@ def used_bytes(store: Store) -> int:
     counts = store.counts.tolist()
     first = counts[TABLE_FIRST] * (2 if counts[N_ENTERED] else 1)
     table = 4 * (2 * first - min(FIRST_TABLE, first))
-    logged = 4 * min(counts[REVISION], counts[LOG_MASK] + 1)
+    logged = LOG_BYTES * min(counts[REVISION], counts[LOG_MASK] + 1)
     blocks, pages = counts[N_EVER_USED] * BLOCK_BYTES, counts[N_PAGES] * 8 * PAGE_WORDS
     chunks = counts[N_CHUNKS_EVER_USED] * CHUNK_BYTES
     return blocks + pages + chunks + table + logged + counts[N_VALUES] * VALUE_BYTES

@@ -17,6 +17,7 @@ from mapping.voxels.store import (
     CELL_EVER_HIT,
     CELL_EXPLAINED,
     CELL_TRUTHS,
+    CHUNK,
     CHUNK_BITS,
     HIT,
     KNOWN,
@@ -120,7 +121,9 @@ def _put(store, block, voxel, place, cell):
     counts[N_OCCUPIED] += more
     store.occupied[block] += more
     counts[N_EXPLAINED] += _both(now, cell) - _both(was, old)
-    store.log[counts[REVISION] & counts[LOG_MASK]] = block * VOXELS + voxel
+    at = counts[REVISION] & counts[LOG_MASK]
+    store.log[at] = block * BRICKS + (voxel >> BRICK_BITS)
+    store.log_voxels[at] = 1 << (voxel & BRICK - 1)
     counts[REVISION] += 1
 
 
@@ -131,30 +134,37 @@ def _both(kind, cell):
 
 
 @njit(cache=True, nogil=True)
-def _apply_block(store, model, block, marks):
-    """The marks of a block's bricks (64,), a byte for each voxel, the first one's lowest; they are zeros then.
+def _apply_block(store, model, block, words, begin):
+    """A block's marks, a word for each brick from ``begin`` on, a byte for each voxel; they are zeros then.
 
     Each voxel once per scan: a hit where any point lay in it, else a miss. A voxel counts as explained when the scan
     that hit it first had nothing but explained points in it, until an unexplained point hits it. Voxels without room
-    are counted. What ``_put`` does is written out here: a call for each voxel takes ten times as long.
+    are counted. What ``_put`` and ``make_brick`` do is written out here: a call with all arrays of a map takes longer.
     """
-    cells, bricks, chunks, kinds, log = store.cells, store.bricks, store.chunks, store.kinds, store.log
+    cells, bricks, chunks, kinds = store.cells, store.bricks, store.chunks, store.kinds
     after_hit, after_miss, counts = store.after_hit, store.after_miss, store.counts
     revision, ring = counts[REVISION], counts[LOG_MASK]
     known, occupied, explained = 0, 0, 0
     for brick in range(BRICKS):
-        word = marks[brick]
+        word = words[begin + brick]
         if word == 0:
             continue
-        marks[brick] = 0
+        words[begin + brick] = 0
         slot = np.int64(bricks[block, brick]) if block >= 0 else 0
-        if slot == 0:
-            slot = make_brick(store, block, brick) if block >= 0 else 0
+        if slot == 0 and block >= 0:
+            filled = np.int64(store.filled[block])
+            if filled == 0 or filled & (CHUNK - 1) != 0:
+                slot = filled + 1
+                store.filled[block] = slot
+                bricks[block, brick] = slot
+            else:
+                slot = make_brick(store, block, brick)
         if slot == 0:
             for i in range(BRICK):
                 counts[N_REFUSED] += int(word >> np.uint64(8 * i) & np.uint64(0xFF) != 0)
             continue
         first = place_in(chunks[block, (slot - 1) >> CHUNK_BITS], slot)
+        changed = 0
         for i in range(BRICK):
             mark = np.int64(word >> np.uint64(8 * i) & np.uint64(0xFF))
             if mark == 0:
@@ -178,16 +188,19 @@ def _apply_block(store, model, block, marks):
             if cell == old:
                 continue
             cells[first + i] = cell
+            changed |= 1 << i
             was, now = np.int64(kinds[number]), np.int64(kinds[after])
             known += (now & KNOWN) - (was & KNOWN)
-            occupied += ((now & OCCUPIED) - (was & OCCUPIED)) // OCCUPIED
+            occupied += (now & OCCUPIED) - (was & OCCUPIED)
             explained += _both(now, cell) - _both(was, old)
-            log[revision & ring] = block * VOXELS + brick * BRICK + i
+        if changed:
+            store.log[revision & ring] = block * BRICKS + brick
+            store.log_voxels[revision & ring] = changed
             revision += 1
     if block >= 0:
-        store.occupied[block] += occupied
+        store.occupied[block] += occupied // OCCUPIED
     counts[N_KNOWN] += known
-    counts[N_OCCUPIED] += occupied
+    counts[N_OCCUPIED] += occupied // OCCUPIED
     counts[N_EXPLAINED] += explained
     counts[REVISION] = revision
 
@@ -204,7 +217,7 @@ def apply_blocks(store, model):
             unexplained = _spread(pages[page, UNEXPLAINED_WORDS + word] >> shift)
             marks[brick] = misses * np.uint64(MISS) | hits * np.uint64(HIT) | unexplained * np.uint64(UNEXPLAINED_HIT)
         pages[page, :] = 0
-        _apply_block(store, model, store.touched[page], marks)
+        _apply_block(store, model, store.touched[page], marks, 0)
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -215,51 +228,59 @@ def _spread(bits):
 
 
 @njit(cache=True, nogil=True)
-def apply_grid(store, model, grid, reached):
-    """Third step of a scan: the marks in the grid, which is all zeros then.
-
-    ``reached`` (2, 3) are the lowest and the highest key with a mark. Voxels without room are counted.
-    """
-    words = grid.marks.view(np.uint64)
-    marks = np.zeros(BRICKS, np.uint64)
-    row = grid.size_x >> SIDE_BITS
-    # A voxel more on each side: where a ray ends on a border, rounding may lead it across.
-    low, high = (reached[0] - 1) >> SIDE_BITS, (reached[1] + 1) >> SIDE_BITS
-    extent = high - low + 1
-    if left_bytes(store) < extent[0] * extent[1] * extent[2] * WHOLE_BLOCK_BYTES:
-        _make_room_for_hits(store, grid, low, high)
-    for bz in range(low[2], high[2] + 1):
-        for by in range(low[1], high[1] + 1):
-            y, z = (by << SIDE_BITS) - grid.y0, (bz << SIDE_BITS) - grid.z0
-            for bx in range(low[0], high[0] + 1):
-                first = (z * grid.size_y + y) * row + bx - (grid.x0 >> SIDE_BITS)
-                if _take_block(words, first, row, grid.size_y * row, marks):
-                    _apply_block(store, model, find_or_make(store, bx, by, bz), marks)
+def apply_grid(store, model, grid):
+    """Third step of a scan: the marks in the grid, which is all zeros then. Voxels without room are counted."""
+    words, flags = grid.marks.view(np.uint64), grid.touched.view(np.uint64)
+    if left_bytes(store) < _count_touched(flags) * WHOLE_BLOCK_BYTES:
+        _make_room_for_hits(store, grid)
+    blocks_x, blocks_y = grid.at_x.size >> SIDE_BITS, grid.at_y.size >> SIDE_BITS
+    for eight in range(flags.size):
+        flag = flags[eight]
+        if flag == 0:
+            continue
+        flags[eight] = 0
+        for n in range(8):
+            if flag >> np.uint64(8 * n) & np.uint64(1):
+                bx, by, bz = _block_key(grid, blocks_x, blocks_y, 8 * eight + n)
+                _apply_block(store, model, find_or_make(store, bx, by, bz), words, (8 * eight + n) * BRICKS)
 
 
 @njit(cache=True, nogil=True)
-def _make_room_for_hits(store, grid, low, high):
-    """Makes the bricks with hits of the blocks ``low`` to ``high`` (3,): of a map's last room they come first."""
-    words = grid.marks.view(np.uint64)
-    row = grid.size_x >> SIDE_BITS
-    layer = grid.size_y * row
-    for bz in range(low[2], high[2] + 1):
-        for by in range(low[1], high[1] + 1):
-            y, z = (by << SIDE_BITS) - grid.y0, (bz << SIDE_BITS) - grid.z0
-            for bx in range(low[0], high[0] + 1):
-                first = (z * grid.size_y + y) * row + bx - (grid.x0 >> SIDE_BITS)
-                block = -1
-                for four in range(0, BRICKS, 4):
-                    near = first + 2 * ((four >> 4) * layer + (four >> 2 & 3) * row)
-                    above = near + layer
-                    hits = (words[near] | words[near + row] | words[above] | words[above + row]) & EVERY_HIT
-                    if hits == 0:
-                        continue
-                    if block < 0:
-                        block = find_or_make(store, bx, by, bz)
-                    for n in range(4):
-                        if block >= 0 and hits >> np.uint64(16 * n) & np.uint64(0xFFFF) != 0:
-                            make_brick(store, block, four + n)
+def _count_touched(flags):
+    count = 0
+    for eight in range(flags.size):
+        count += np.int64(flags[eight] * np.uint64(0x0101010101010101) >> np.uint64(56))
+    return count
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _block_key(grid, blocks_x, blocks_y, number):
+    """Of a block of the grid, by its number there."""
+    row = number // blocks_x
+    return (
+        (grid.x0 >> SIDE_BITS) + number - row * blocks_x,
+        (grid.y0 >> SIDE_BITS) + row % blocks_y,
+        (grid.z0 >> SIDE_BITS) + row // blocks_y,
+    )
+
+
+@njit(cache=True, nogil=True)
+def _make_room_for_hits(store, grid):
+    """Makes the bricks with hits: of a map's last room they come first."""
+    words, touched = grid.marks.view(np.uint64), grid.touched
+    blocks_x, blocks_y = grid.at_x.size >> SIDE_BITS, grid.at_y.size >> SIDE_BITS
+    for number in range(touched.size):
+        if touched[number] == 0:
+            continue
+        block = -1
+        for brick in range(BRICKS):
+            if words[number * BRICKS + brick] & EVERY_HIT == 0:
+                continue
+            if block < 0:
+                bx, by, bz = _block_key(grid, blocks_x, blocks_y, number)
+                block = find_or_make(store, bx, by, bz)
+            if block >= 0:
+                make_brick(store, block, brick)
 
 
 @njit(cache=True, nogil=True)
@@ -270,30 +291,6 @@ def make_room_for_hits(store):
             word, shift = HIT_WORDS + brick // 8, np.uint64(brick % 8 * 8)
             if store.marks[page, word] >> shift & np.uint64(0xFF) != 0:
                 make_brick(store, store.touched[page], brick)
-
-
-@njit(cache=True, nogil=True)
-def _take_block(words, first, row, layer, marks):
-    """Takes a block's marks out of the grid, brick by brick; whether there are any.
-
-    The words of a block begin at ``first``, eight voxels each; ``row`` and ``layer`` words on the next row and layer.
-    """
-    any_there = False
-    for four in range(0, BRICKS, 4):
-        # Four bricks side by side are four rows of eight voxels: two of one layer, two of the next.
-        near = first + 2 * ((four >> 4) * layer + (four >> 2 & 3) * row)
-        above = near + layer
-        a, b, c, d = words[near], words[near + row], words[above], words[above + row]
-        if a | b | c | d == 0:
-            continue
-        any_there = True
-        for n in range(4):
-            shift, pair = np.uint64(16 * n), np.uint64(0xFFFF)
-            low = a >> shift & pair | (b >> shift & pair) << np.uint64(16)
-            high = c >> shift & pair | (d >> shift & pair) << np.uint64(16)
-            marks[four + n] = low | high << np.uint64(32)
-        words[near], words[near + row], words[above], words[above + row] = 0, 0, 0, 0
-    return any_there
 
 
 @njit(cache=True, nogil=True)

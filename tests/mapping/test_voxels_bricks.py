@@ -285,8 +285,7 @@ def test_what_a_laser_sees_costs_at_most_eight_bytes_a_voxel(name: str, shared_d
         voxels.insert(points, origin_enu=origin, max_range_m=40.0)
     blocks = voxels.blocks.counts[store.N_BLOCKS]
     assert voxels.voxel_count / (blocks * store.VOXELS) < 0.3
-    log_bytes = 4 * min(voxels.revision, store.FIRST_LOG)
-    assert (voxels.size_bytes - log_bytes) / voxels.voxel_count <= 7.0
+    assert voxels.size_bytes / voxels.voxel_count <= 8.0
 
 
 def test_a_laser_in_a_forest_costs_at_most_eight_bytes_a_voxel() -> None:
