@@ -283,8 +283,8 @@ class VoxelMap:
 
     @property
     def _most_marks(self) -> int:
-        """So many that they and the blocks' flags fit."""
-        return min(LARGEST_GRID, self._memory_limit_bytes) * store.VOXELS // (store.VOXELS + 1)
+        """So many that they and the blocks' flags, which come by eight, fit."""
+        return max(0, min(LARGEST_GRID, self._memory_limit_bytes) - 8) * store.VOXELS // (store.VOXELS + 1)
 
     def _have_marks(self, voxels: int) -> None:
         """At least so many bytes; at most four times what the last scans needed, more are given back."""
@@ -292,8 +292,9 @@ class VoxelMap:
         if voxels <= len(self._marks) <= 4 * self._needed:
             return
         self._marks, self._touched = NO_GRID.marks, NO_GRID.touched  # given back before there are new ones
-        self._marks = np.zeros(max(voxels, min(self._most_marks, self._needed * 5 // 4)) // 8 * 8, np.uint8)
-        self._touched = np.zeros(-(-len(self._marks) // (8 * store.VOXELS)) * 8, np.uint8)
+        size = max(voxels, min(self._most_marks, self._needed * 5 // 4)) // 8 * 8
+        touched = np.zeros(-(-size // (8 * store.VOXELS)) * 8, np.uint8)
+        self._marks, self._touched = np.zeros(size, np.uint8), touched  # both or, where memory is out, neither
 
 
 def _probability(log_odds: F32) -> F32:

@@ -40,11 +40,11 @@ N_VALUES, N_PAGES, TABLE_FIRST, LOG_MASK, LOG_FROM = range(9, 14)
 N_CHUNKS, N_CHUNKS_EVER_USED, N_ENTERED, LIMIT_BYTES = range(14, 18)
 
 MAX_BLOCKS = 1 << 23
-"""A brick's number in the log of changes has 32 bits."""
+"""4.3 thousand million voxels; a brick's number in the log of changes, 64 to a block, has 32 bits."""
 MAX_LOG, MIN_LOG = 1 << 21, 1 << 9
-FIRST_LOG = 1 << 12
+FIRST_LOG = 1 << 13
 """It grows with the map, so that a small one has no long one."""
-VOXELS_LOGGED = 8
+VOXELS_LOGGED = 4
 """Known voxels for each place of the log, at most, once it has grown."""
 LOG_BYTES = 5
 """Of one place."""
