@@ -106,7 +106,7 @@ def test_what_waits_about_a_vehicle_is_dropped_when_the_page_shows_another() -> 
     page.put(second, Outgoing(second), of_vehicle=True)
     waiting = [asyncio.run(page.next_text()) for _ in range(2)]
     assert ["for all" in waiting[0], "Ben" in waiting[1]] == [True, True]
-    assert not (page._urgent or page._others)
+    assert (page._urgent, page._others) == ({}, {})
 
 
 def test_a_vehicle_s_words_go_only_to_pages_that_show_it() -> None:
