@@ -222,6 +222,24 @@ def test_too_many_and_too_long_are_refused(tmp_path: Path) -> None:
         listing_of(folder / "0.tif")
 
 
+@pytest.mark.parametrize(
+    ("made", "why"),
+    [
+        ({"stac_version": "0.9.0", "type": "Feature", "properties": {"eo:gsd": 2.0}}, "It is STAC 0.9.0"),
+        ({"stac_version": "0.8.1", "description": "older catalogues have no type"}, "It is STAC 0.8.1"),
+        ({"stac_version": "1.0.0"}, "it has no type"),
+        ({"stac_version": "1.0.0", "type": "Topology"}, "Invalid enum value 'Topology'"),
+    ],
+)
+def test_a_document_that_names_its_fields_otherwise_is_refused(tmp_path: Path, made: dict[str, Any], why: str) -> None:
+    path = folder_with(tmp_path, "a.tif") / "a.json"
+    path.write_text(json.dumps({"id": "a", "assets": {"dsm": {"href": "./a.tif"}}, **made}))
+    with pytest.raises(RasterFormatError, match=why):
+        listing_of(path)
+    found = listing_of(path.parent)
+    assert [(out.name, why in out.why) for out in found.left_out] == [("a.json", True)]
+
+
 def mutated(document: Any) -> Iterator[Any]:
     """Every value of a document put otherwise, one at a time."""
     odd: list[Any] = [

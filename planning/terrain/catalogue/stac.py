@@ -1,7 +1,9 @@
 """What a STAC document on disk says: which rasters, of when, with which errors, and which documents it names.
 
-Plain JSON is read, no library of STAC: pystac brings two dozen distributions along and opens whatever a document
-names. What a document names counts only as a path below the catalogue's folder; who reads it is asked elsewhere
+Plain JSON is read, no library of STAC. Read by pystac 1.15 a `gsd` of "abc" or NaN and an id that is a number pass, a
+link that is a number ends in a TypeError, and `eo:gsd` of before 1.0 stays what it was without one of its two dozen
+distributions: all that is here would be looked at again. Before 1.0 fields had other names, so such documents are
+refused. What a document names counts only as a path below the catalogue's folder; who reads it is asked elsewhere
 (``listed_models``).
 """
 
@@ -56,9 +58,10 @@ class _Link(msgspec.Struct):
 
 
 class _Document(msgspec.Struct):
-    type: Literal["Feature", "Catalog", "Collection"]
     stac_version: str
     id: str
+    type: Literal["Feature", "Catalog", "Collection"] | None = None
+    """Catalogues of before 1.0 have none."""
     properties: _Properties | None = None
     assets: dict[str, _Asset] | None = None
     links: list[_Link] | None = None
@@ -104,6 +107,16 @@ def read_document(path: Path) -> Document:
         raise RasterFormatError(
             f"It is no STAC document ({error}).", where=where, advice="Write it again, or leave it out."
         ) from error
+    if not found.stac_version.startswith("1."):
+        raise RasterFormatError(
+            f"It is STAC {_short(found.stac_version)}, which names what it tells in another way.",
+            where=where,
+            advice="Write it as STAC 1.0 or 1.1.",
+        )
+    if found.type is None:
+        raise RasterFormatError(
+            "It is no STAC document (it has no type).", where=where, advice="Write it again, or leave it out."
+        )
     if len(found.assets or {}) > MOST_ASSETS:
         raise RasterError(f"It has more than {MOST_ASSETS} assets.", where=where, advice="Split it.")
     is_item = found.type == "Feature"
