@@ -17,14 +17,12 @@ from planning.fence.fence_model import RallyPoint
 from planning.formats.commands import has_position
 from planning.missions.flown import flown_line
 from planning.planner.request import PlanRequest
-from planning.terrain.dsm import LARGE_PX, SCALE_TOLERANCE, Dsm, SurfaceModel
+from planning.terrain.dsm import FLIGHT_MARGIN_M, LARGE_PX, SCALE_TOLERANCE, Dsm, SurfaceModel
 from planning.terrain.holes import HoleReport, fill_holes
 
 MARGIN_M = 10.0
 """Around the points, beside what the ball and the Gaussian reach."""
 GROWTH = 3.0
-FLIGHT_MARGIN_M = 300.0
-"""Around a flight: nothing that is farther from it than this decides anything about it."""
 T = TypeVar("T")
 Judged = tuple[FlownLine, Certificate]
 
@@ -82,11 +80,17 @@ def least_margin_m(model: SurfaceModel, request: PlanRequest) -> float:
     return felt_m(request) + request.clearance_over(model).required_clearance_m + MARGIN_M
 
 
+def looked_over(model: SurfaceModel, xy_m: F64, required_clearance_m: float = 0.0) -> SurfaceModel:
+    """The model as a flight among projected (N, 2) places meets it: ``SurfaceModel.over``."""
+    return model.over(xy_m, max(FLIGHT_MARGIN_M, required_clearance_m))
+
+
 def needed_part(model: SurfaceModel, xy_m: F64, margin_m: float) -> Dsm:
     """The model within ``margin_m`` of the bounding box of projected (N, 2) points; whole where that saves little.
 
     Points outside the model need nothing of it.
     """
+    model = looked_over(model, xy_m)
     return _part(model, _needed_box(model, xy_m, margin_m))
 
 
@@ -122,6 +126,8 @@ def certify_part(
     assumptions: Mapping[str, object],
 ) -> tuple[Ground, Certificate]:
     """The part that it took, and the certificate, which is the one over the whole model with its small holes filled."""
+    places_m = mission_places(model, mission)
+    model = looked_over(model, places_m, params.required_clearance_m)
 
     def judge(ground: Ground) -> tuple[Ground, Judged]:
         line = flown_line(mission, ground.filled)
@@ -132,9 +138,7 @@ def certify_part(
         return was_enough(ground, model, *found[1])
 
     grounds = Grounds(model, max_hole_m2)
-    ground, (_, certificate) = grounds.judged(
-        mission_places(model, mission), params.required_clearance_m + MARGIN_M, judge, is_enough
-    )
+    ground, (_, certificate) = grounds.judged(places_m, params.required_clearance_m + MARGIN_M, judge, is_enough)
     return ground, certificate
 
 

@@ -35,7 +35,16 @@ from planning.missions.flown import flown_line
 from planning.missions.home import HOME_DECIMALS, default_home, home_from_dsm, home_there, moved_note
 from planning.missions.mission import BuiltMission, Choice, build_mission, decimation_trade
 from planning.planner.laid import Detour, Route, before_home, home_place, laid_route
-from planning.planner.part import Ground, Grounds, felt_m, hole_assumptions, least_margin_m, rally_places, was_enough
+from planning.planner.part import (
+    Ground,
+    Grounds,
+    felt_m,
+    hole_assumptions,
+    least_margin_m,
+    looked_over,
+    rally_places,
+    was_enough,
+)
 from planning.planner.request import PlanRequest, check_request, check_size, effective_profile
 from planning.route.path import sampled_path
 from planning.route.poi import check_pois
@@ -106,6 +115,7 @@ def plan_mission(
     """
     check_request(request)
     check_size(request, model)
+    model = looked_over(model, _points(model, request), request.clearance().required_clearance_m)
     request = before_home(model, request)
     report(SURFACE_STEP, 0.0)
     grounds = Grounds(model, request.surface.fill_hole_area_m2)
@@ -140,6 +150,10 @@ def _planned_from(job: _Job, home: Home, why_moved: str) -> Plan:
     route = laid_route(model, request, home)
     job = replace(job, request=replace(request, pois=route.pois))
     points_xy_m = np.vstack([_points(model, request), route.vertices_xy_m, home_place(model, home)])
+    wider = looked_over(model, points_xy_m, request.clearance().required_clearance_m)
+    if wider is not model:  # a way around the fence may lead to other models of a catalogue
+        model, job = wider, replace(job, grounds=Grounds(wider, request.surface.fill_hole_area_m2))
+        home = home_from_dsm(model, (home.lat_deg, home.lon_deg))
     feels_m = felt_m(request)
 
     def is_enough(ground: Ground, plan: Plan) -> bool:

@@ -39,14 +39,19 @@ def certificate_summary(certificate: Certificate) -> dict[str, Any]:
 
 
 def dsm_summary(source: SurfaceModel, part: Dsm, *, holes_filled: int) -> dict[str, Any]:
-    """Identity and size of the surface model, and what was unknown in the part looked at (before holes were filled)."""
+    """Identity and size of the surface model, and what was unknown in the part looked at (before holes were filled).
+
+    Of a catalogue in the cells of the part.
+    """
+    west, south, east, north = source.bounds_m
+    cell_m = part.resolution_m
     return {
         "sha256": source.sha256,
         "crs": crs_name(source),
         "vertical_datum": source.vertical_datum,
-        "width": source.width_px,
-        "height": source.height_px,
-        "resolution_m": source.resolution_m,
+        "width": round((east - west) / cell_m),
+        "height": round((north - south) / cell_m),
+        "resolution_m": cell_m,
         "part": {"width": part.width_px, "height": part.height_px},
         "unknown_share": unknown_share(part),
         "holes_filled": holes_filled,

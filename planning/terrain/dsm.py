@@ -22,6 +22,10 @@ SCALE_TOLERANCE = 0.01
 """Largest deviation of the CRS's metre from the true one; national grids and UTM stay below 0.002."""
 
 
+FLIGHT_MARGIN_M = 300.0
+"""Around a flight: nothing that is farther from it than this decides anything about it."""
+
+
 class SurfaceModel(ABC):
     """Where a surface model lies, and how to look at a part of it: in memory (``Dsm``) or still in its file."""
 
@@ -60,6 +64,14 @@ class SurfaceModel(ABC):
     def around(self, xy_m: F64, margin_m: float) -> Dsm:
         """The part within ``margin_m`` of the bounding box of projected (N, 2) points; the nearest cell at least."""
         return self.window(*self.box_around(xy_m, margin_m))
+
+    def over(self, xy_m: F64, margin_m: float = FLIGHT_MARGIN_M) -> SurfaceModel:
+        """The model as a flight among projected (N, 2) places meets it, within ``margin_m`` of their bounding box.
+
+        One model is the same everywhere. Of several, their grid and how far things may stand beside their place are
+        those of the models around: all that plans, judges and flies begins with this, so that it means the same.
+        """
+        return self
 
     def box_around(self, xy_m: F64, margin_m: float) -> tuple[int, int, int, int]:
         """First row, first column, rows and columns of that part."""

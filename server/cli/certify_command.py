@@ -20,7 +20,7 @@ from planning.formats.other_surface import other_surface
 from planning.formats.poi_files import warn_swapped
 from planning.margins.words import uncovered_words
 from planning.missions.feasibility import Feasibility, feasibility_json, feasibility_of, not_judged
-from planning.planner.part import certify_part
+from planning.planner.part import certify_part, looked_over, mission_places
 from planning.planner.plan import CERTIFICATE_STEP
 from planning.report.summary import certificate_summary, dsm_summary
 from planning.terrain.dsm import Dsm
@@ -56,7 +56,9 @@ def certify(
     vehicle = request.profile
     timer = StepTimer(progress)
     opened = open_model(dsm, timer, model)
-    source, params = opened.model, request.clearance_over(opened.model)
+    demanded_m = request.clearance().required_clearance_m
+    source = looked_over(opened.model, mission_places(opened.model, flight), demanded_m)
+    params = request.clearance_over(source)
     other = other_surface(flight, source)
     uncovered = uncovered_words(params.budget, params.required_clearance_m)
     warnings = [

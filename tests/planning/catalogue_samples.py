@@ -41,12 +41,13 @@ def in_memory(
     horizontal_m: float = 1.0,
     year: int | None = 2020,
     name: str = "a",
+    place_m: float = 0.0,
 ) -> CatalogueModel:
     """A model whose north-west corner lies so far east and south of ``WEST_M``, ``NORTH_M``."""
     transform = Affine(cell_m, 0.0, WEST_M + east_m, 0.0, -cell_m, NORTH_M - south_m)
     file = Remembered(heights, transform, CRS.from_epsg(32633), None, f"of {name}", name=name)
     taken = None if year is None else datetime(year, 5, 1, tzinfo=UTC)
-    return CatalogueModel(cast(DsmFile, file), name, taken, cell_m, rms_m, told, horizontal_m)
+    return CatalogueModel(cast(DsmFile, file), name, taken, cell_m, rms_m, told, horizontal_m, place_m)
 
 
 def item(folder: Path, raster: str, *, name: str = "", **properties: Any) -> Path:
@@ -104,21 +105,17 @@ def slow_square(layers: tuple[Layer, ...], west: float, north: float, side: floa
     return Slow(high, low, best)
 
 
-def worse_end(
+def who_counts(
     layers: tuple[Layer, ...], transform: Affine, shape: tuple[int, int]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Highest, lowest and best of each square by the rule as it is written down, one square and one pair at a time."""
+) -> dict[tuple[int, int], tuple[Slow, set[int]]]:
+    """Of each square what the models say, and which of them count, by the rule as it is written down."""
     squares = {
         (row, column): slow_square(layers, *(transform @ (column, row)), transform.a)
         for row in range(shape[0])
         for column in range(shape[1])
     }
-    highest, lowest = np.full(shape, np.nan), np.full(shape, np.nan)
-    best = np.full(shape, -1)
+    found = dict[tuple[int, int], tuple[Slow, set[int]]]()
     for (row, column), here in squares.items():
-        best[row, column] = here.best
-        if here.best < 0:
-            continue
         counting = {here.best} | {k for k in range(here.best) if math.isfinite(here.high_m[k])}
         for (r, c), there in squares.items():
             away_m = transform.a * math.hypot(max(0, abs(r - row) - 1), max(0, abs(c - column) - 1))
@@ -126,6 +123,19 @@ def worse_end(
                 continue
             if away_m <= seam_m(layers[here.best].model, layers[there.best].model):
                 counting.add(there.best)
-        highest[row, column] = max(here.high_m[k] + layers[k].raise_m for k in counting)
-        lowest[row, column] = min(here.low_m[k] - layers[k].drop_m for k in counting)
+        found[row, column] = here, counting if here.best >= 0 else set()
+    return found
+
+
+def worse_end(
+    layers: tuple[Layer, ...], transform: Affine, shape: tuple[int, int]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Highest, lowest and best of each square by the rule as it is written down, one square and one pair at a time."""
+    highest, lowest = np.full(shape, np.nan), np.full(shape, np.nan)
+    best = np.full(shape, -1)
+    for place, (here, counting) in who_counts(layers, transform, shape).items():
+        best[place] = here.best
+        if counting:
+            highest[place] = max(here.high_m[k] + layers[k].raise_m for k in counting)
+            lowest[place] = min(here.low_m[k] - layers[k].drop_m for k in counting)
     return highest, lowest, best

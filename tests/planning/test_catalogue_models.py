@@ -105,7 +105,7 @@ def test_a_part_that_is_too_large_names_the_model_whose_cells_make_it_so() -> No
     catalogue = Catalogue(Opened((coarse, fine), (), ()), "maps", RasterLimits(max_px=10_000))
     with pytest.raises(RasterError) as error:
         catalogue.window(0, 0, 200, 200)
-    assert error.value.where == "maps, at the cells of its finest model tiny (0.1 m)"
+    assert error.value.where == "maps, at the cells of tiny, the finest model here (0.1 m)"
 
 
 def test_a_catalogue_of_nothing_that_can_be_used_says_why(tmp_path: Path) -> None:

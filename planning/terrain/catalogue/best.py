@@ -8,12 +8,12 @@ that one counts too, and the higher of both is taken: objects at the edge of a m
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from affine import Affine
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
+from scipy.ndimage import distance_transform_cdt, maximum_filter1d, minimum_filter1d
 
 from mapping.geometry.arrays import F32, Bools
 from planning.terrain.catalogue.models import CatalogueModel
@@ -73,7 +73,20 @@ def seam_m(one: CatalogueModel, other: CatalogueModel) -> float:
 
 
 def farthest_seam_m(models: Sequence[CatalogueModel]) -> float:
-    return max((seam_m(one, other) for one in models for other in models if one is not other), default=0.0)
+    """From how far around a part others decide what counts in it, of the models that reach into the part."""
+    pairs = (seam_m(one, other) for one in models for other in models if one is not other)
+    return max(pairs, default=SEAM_M)
+
+
+def meeting(models: Sequence[CatalogueModel], bounds_m: tuple[float, float, float, float]) -> list[CatalogueModel]:
+    """Those whose extents meet (west, south, east, north), an edge in common included."""
+    west, south, east, north = bounds_m
+    within = [model.file.bounds_m for model in models]
+    return [
+        model
+        for model, (w, s, e, n) in zip(models, within, strict=True)
+        if w <= east and west <= e and s <= north and south <= n
+    ]
 
 
 def surface_of(
@@ -86,39 +99,74 @@ def surface_of(
     """Of (rows, columns) squares of a north-up grid; what lies outside of it is not looked at."""
     high_m, low_m = np.full(shape, -np.inf, np.float32), np.full(shape, np.inf, np.float32)
     best, seam = np.full(shape, NO_MODEL, np.uint8), np.zeros(shape, np.bool_)
-    for number, layer in enumerate(layers):
-        progress(number / len(layers))
-        if not (best == NO_MODEL).any():
-            break
-        found = _touched(layer.model, transform, shape)
-        layer.model.file.forget()
-        if found is None:
-            continue
-        rows, columns, touched = found
-        here = best[rows, columns]
-        here[touched.whole & (here == NO_MODEL)] = number
-        counts = _counting(layers, number, best, transform.a)[rows, columns] | (best[rows, columns] == number)
-        counts |= ~touched.whole & (here > number)  # an edge: what of it is known stands there all the same
-        counts &= ~np.isnan(touched.high_m)
-        seam[rows, columns] |= counts & (here != number)
-        np.fmax(
-            high_m[rows, columns], touched.high_m + np.float32(layer.raise_m), out=high_m[rows, columns], where=counts
-        )
-        np.fmin(low_m[rows, columns], touched.low_m - np.float32(layer.drop_m), out=low_m[rows, columns], where=counts)
+    for number, part, touched, counts in _one_by_one(layers, transform, best, progress):
+        layer = layers[number]
+        seam[part] |= counts & (best[part] != number)
+        np.fmax(high_m[part], touched.high_m + np.float32(layer.raise_m), out=high_m[part], where=counts)
+        np.fmin(low_m[part], touched.low_m - np.float32(layer.drop_m), out=low_m[part], where=counts)
     unknown = best == NO_MODEL
     high_m[unknown] = low_m[unknown] = np.nan
     return Surface(high_m, low_m, best, (seam | _near_another(best, transform.a)) & ~unknown)
 
 
-def _counting(layers: Sequence[Layer], number: int, best: np.ndarray, cell_m: float) -> Bools:
-    """Where a better model is the best, and this one is within the reach of their seam."""
-    mine, counts = best == number, np.zeros(best.shape, np.bool_)
-    if not mine.any():
+def counting_in(
+    layers: Sequence[Layer], transform: Affine, shape: tuple[int, int], inner: tuple[slice, slice]
+) -> set[int]:
+    """Which layers count anywhere in the ``inner`` (rows, columns) of a north-up grid."""
+    found, best = set[int](), np.full(shape, NO_MODEL, np.uint8)
+    for number, part, _, counts in _one_by_one(layers, transform, best, lambda share: None):
+        everywhere = np.zeros(shape, np.bool_)
+        everywhere[part] = counts
+        if everywhere[inner].any():
+            found.add(number)
+    return found
+
+
+def _one_by_one(
+    layers: Sequence[Layer], transform: Affine, best: np.ndarray, progress: Callable[[float], None]
+) -> Iterator[tuple[int, tuple[slice, slice], Touched, Bools]]:
+    """Of each layer that reaches into the grid: its number, where, what is touched of it, and where of that it counts.
+
+    ``best`` is filled in as they come. Only the squares that a layer reaches into are looked at.
+    """
+    for number, layer in enumerate(layers):
+        progress(number / len(layers))
+        part = _reached(layer.model, transform, best.shape)
+        if part is None:
+            continue
+        if not (best == NO_MODEL).any():
+            break
+        touched = _touched(layer.model, transform, part)
+        layer.model.file.forget()
+        here = best[part]
+        here[touched.whole & (here == NO_MODEL)] = number
+        counts = _counting(layers, number, here, transform.a) | (here == number)
+        counts |= ~touched.whole & (here > number)  # an edge: what of it is known stands there all the same
+        yield number, part, touched, counts & ~np.isnan(touched.high_m)
+
+
+def _counting(layers: Sequence[Layer], number: int, here: np.ndarray, cell_m: float) -> Bools:
+    """Where a better model is the best, and this one is within the reach of their seam.
+
+    ``here``: the best of each square that this one reaches into; it is the best in no other.
+    """
+    mine, counts = here == number, np.zeros(here.shape, np.bool_)
+    seams_px = np.full(NO_MODEL + 1, -1, np.int32)
+    for better in np.flatnonzero(np.bincount(here.ravel(), minlength=number)[:number]).tolist():
+        seams_px[better] = math.ceil(seam_m(layers[number].model, layers[better].model) / cell_m) + 1
+    if not mine.any() or seams_px.max() < 0:
         return counts
-    for better in np.unique(best[best < number]).tolist():
-        px = math.ceil(seam_m(layers[number].model, layers[better].model) / cell_m) + 1
-        counts |= (best == better) & (_grown(mine, px) > 0)
+    part = tuple(_spanned(mine.any(axis=1 - axis), int(seams_px.max())) for axis in (0, 1))
+    # Squares around a square: the larger of rows and columns between both. They hold the disc.
+    apart_px = np.asarray(distance_transform_cdt(~mine[part], metric="chessboard"))
+    counts[part] = apart_px <= seams_px[here[part]]
     return counts
+
+
+def _spanned(some: Bools, around: int) -> slice:
+    """From the first that is true to the last, and so many more."""
+    places = np.flatnonzero(some)
+    return slice(max(0, int(places[0]) - around), int(places[-1]) + 1 + around)
 
 
 def _near_another(best: np.ndarray, cell_m: float) -> Bools:
@@ -142,18 +190,24 @@ def _width(px: int, count: int) -> int:
     return min(2 * px + 1, 2 * count + 1)
 
 
-def _touched(model: CatalogueModel, transform: Affine, shape: tuple[int, int]) -> tuple[slice, slice, Touched] | None:
-    """Rows and columns of the grid that a model reaches into, and what they touch of it; None: none."""
-    file, cell_m = model.file, transform.a
-    west, south, east, north = file.bounds_m
+def _reached(model: CatalogueModel, transform: Affine, shape: tuple[int, ...]) -> tuple[slice, slice] | None:
+    """Rows and columns of the grid that a model reaches into; None: none."""
+    west, south, east, north = model.file.bounds_m
+    cell_m = transform.a
     row0, row1 = _clipped((transform.f - north) / cell_m, (transform.f - south) / cell_m, shape[0])
     column0, column1 = _clipped((west - transform.c) / cell_m, (east - transform.c) / cell_m, shape[1])
-    if row0 >= row1 or column0 >= column1:
-        return None
-    corner = transform @ Affine.translation(column0, row0)
-    cells = _around(file.window, file.transform, corner, (row1 - row0, column1 - column0)).cells
-    touched = touched_cells(cells, corner, (row1 - row0, column1 - column0))
-    return slice(row0, row1), slice(column0, column1), touched
+    return (slice(row0, row1), slice(column0, column1)) if row0 < row1 and column0 < column1 else None
+
+
+def _touched(model: CatalogueModel, transform: Affine, part: tuple[slice, slice]) -> Touched:
+    """What the squares of a part of the grid touch of a model."""
+    rows, columns = part
+    corner, shape = transform @ Affine.translation(columns.start, rows.start), (len_of(rows), len_of(columns))
+    return touched_cells(_around(model.file.window, model.file.transform, corner, shape).cells, corner, shape)
+
+
+def len_of(part: slice) -> int:
+    return part.stop - part.start
 
 
 def _around(window: Callable[[int, int, int, int], Dsm], own: Affine, corner: Affine, shape: tuple[int, int]) -> Dsm:

@@ -76,8 +76,10 @@ def _plan(
     timer = StepTimer(progress)
     opened = open_model(dsm, timer, how)
     timer(CERTIFICATE_STEP, None)
-    demanded = request.clearance_over(opened.model)
-    _, certificate = certify_part(opened.model, flight, demanded, max_hole_m2=how.max_hole_m2, assumptions=opened.made)
+    # What the model adds is added where it is judged.
+    _, certificate = certify_part(
+        opened.model, flight, request.clearance(), max_hole_m2=how.max_hole_m2, assumptions=opened.made
+    )
     end_progress()
     return low_plan(flight, speed_m_s=speed_m_s, return_needed_m=certificate.rtl_height_needed_m)
 
