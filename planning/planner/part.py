@@ -15,7 +15,7 @@ from planning.certificate.certificate_model import Certificate, ClearanceParams
 from planning.certificate.clearance import certify
 from planning.fence.fence_model import RallyPoint
 from planning.formats.commands import has_position
-from planning.missions.flown import flown_line
+from planning.missions.flown import PLACED, flown_line
 from planning.planner.request import PlanRequest
 from planning.terrain.dsm import FLIGHT_MARGIN_M, LARGE_PX, SCALE_TOLERANCE, Dsm, SurfaceModel
 from planning.terrain.holes import HoleReport, fill_holes
@@ -82,16 +82,18 @@ def least_margin_m(model: SurfaceModel, request: PlanRequest) -> float:
 
 def looked_over(model: SurfaceModel, xy_m: F64, required_clearance_m: float = 0.0) -> SurfaceModel:
     """The model as a flight among projected (N, 2) places meets it: ``SurfaceModel.over``."""
-    return model.over(xy_m, max(FLIGHT_MARGIN_M, required_clearance_m))
+    return model.over(xy_m, _looked_m(required_clearance_m))
 
 
-def needed_part(model: SurfaceModel, xy_m: F64, margin_m: float) -> Dsm:
-    """The model within ``margin_m`` of the bounding box of projected (N, 2) points; whole where that saves little.
+def needed_part(model: SurfaceModel, xy_m: F64, required_clearance_m: float = 0.0) -> Dsm:
+    """The model around the bounding box of projected (N, 2) points, as a flight among them meets it.
 
-    Points outside the model need nothing of it.
+    Whole where a part saves little, and what it tells of its errors holds in all of it. Points outside the model need
+    nothing of it.
     """
-    model = looked_over(model, xy_m)
-    return _part(model, _needed_box(model, xy_m, margin_m))
+    look, margin_m = looked_over(model, xy_m, required_clearance_m), _looked_m(required_clearance_m)
+    is_cut = look.place_m < look.most_place_m  # the smaller error is that of what was looked at: no line leaves that
+    return _part(look, _needed_box(look, xy_m, margin_m, is_cut=is_cut))
 
 
 def was_enough(
@@ -131,7 +133,7 @@ def certify_part(
 
     def judge(ground: Ground) -> tuple[Ground, Judged]:
         line = flown_line(mission, ground.filled)
-        made = {**hole_assumptions(ground.holes, max_hole_m2), **assumptions}
+        made = {**hole_assumptions(ground.holes, max_hole_m2), **model.said_of_look, **assumptions}
         return ground, (line, certify(ground.filled, line, params, ground=model, assumptions=made))
 
     def is_enough(ground: Ground, found: tuple[Ground, Judged]) -> bool:
@@ -143,8 +145,9 @@ def certify_part(
 
 
 def mission_places(model: SurfaceModel, mission: Mission) -> F64:
-    """(N, 2) projected places of home, of all items that have one, and of rally points."""
-    places = [(item.lat_deg, item.lon_deg) for item in mission.items if has_position(item)]
+    """(N, 2) projected places of home, of all items that are flown to, and of rally points; not what is looked at."""
+    flown_to = (item for item in mission.items if item.command in PLACED and has_position(item))
+    places = [(item.lat_deg, item.lon_deg) for item in flown_to]
     home = mission.home
     flown_m = model.xy_from_lat_lon(np.array([*places, (home.lat_deg, home.lon_deg)]))
     return np.vstack([flown_m, rally_places(model, mission.rally)])
@@ -163,17 +166,21 @@ def hole_assumptions(holes: HoleReport, max_hole_m2: float) -> dict[str, object]
     return {"holes_filled": holes.count, "holes_filled_area_m2": holes.area_m2, "max_hole_m2": max_hole_m2}
 
 
-def _needed_box(model: SurfaceModel, xy_m: F64, margin_m: float) -> tuple[int, int, int, int]:
-    """First row, first column, rows and columns."""
+def _looked_m(required_clearance_m: float) -> float:
+    return max(FLIGHT_MARGIN_M, required_clearance_m)
+
+
+def _needed_box(model: SurfaceModel, xy_m: F64, margin_m: float, *, is_cut: bool = False) -> tuple[int, int, int, int]:
+    """First row, first column, rows and columns. ``is_cut``: never more than within the margin."""
     whole = (0, 0, model.height_px, model.width_px)
-    if model.height_px * model.width_px < LARGE_PX:
+    if not is_cut and model.height_px * model.width_px < LARGE_PX:
         return whole
     west, south, east, north = model.bounds_m
     inside = xy_m[((xy_m >= (west, south)) & (xy_m <= (east, north))).all(axis=1)]
     if not len(inside):
         return 0, 0, 1, 1
     box = model.box_around(inside, margin_m)
-    return whole if box[2] * box[3] > model.height_px * model.width_px / 2 else box
+    return whole if not is_cut and box[2] * box[3] > model.height_px * model.width_px / 2 else box
 
 
 def _part(model: SurfaceModel, box: tuple[int, int, int, int]) -> Dsm:

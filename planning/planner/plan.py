@@ -42,6 +42,7 @@ from planning.planner.part import (
     hole_assumptions,
     least_margin_m,
     looked_over,
+    mission_places,
     rally_places,
     was_enough,
 )
@@ -115,7 +116,7 @@ def plan_mission(
     """
     check_request(request)
     check_size(request, model)
-    model = looked_over(model, _points(model, request), request.clearance().required_clearance_m)
+    model = looked_over(model, _flown_to(model, request), request.clearance().required_clearance_m)
     request = before_home(model, request)
     report(SURFACE_STEP, 0.0)
     grounds = Grounds(model, request.surface.fill_hole_area_m2)
@@ -145,12 +146,32 @@ class _Job:
 
 
 def _planned_from(job: _Job, home: Home, why_moved: str) -> Plan:
-    """``why_moved``: what is wrong with home at the first point; empty when it is there or was given."""
+    """``why_moved``: what is wrong with home at the first point; empty when it is there or was given.
+
+    Over the models around what is flown in the end, as all who judge its file will look at them.
+    """
+    plan, look = _planned_over(job, home, why_moved, None)
+    flown = _look_of(plan, look)
+    if flown is look:
+        return plan
+    again, _ = _planned_over(job, home, why_moved, flown)
+    return again if _look_of(again, flown) is flown else plan
+
+
+def _look_of(plan: Plan, look: SurfaceModel) -> SurfaceModel:
+    required_m = plan.request.clearance().required_clearance_m
+    return looked_over(look, mission_places(look, plan.mission), required_m)
+
+
+def _planned_over(job: _Job, home: Home, why_moved: str, look: SurfaceModel | None) -> tuple[Plan, SurfaceModel]:
+    """The plan, and the model as it was looked at; ``look``: None: that around the path that is laid."""
     model, request = job.model, job.request
     route = laid_route(model, request, home)
     job = replace(job, request=replace(request, pois=route.pois))
-    points_xy_m = np.vstack([_points(model, request), route.vertices_xy_m, home_place(model, home)])
-    wider = looked_over(model, points_xy_m, request.clearance().required_clearance_m)
+    laid_xy_m = np.vstack([route.vertices_xy_m, home_place(model, home)])
+    points_xy_m = np.vstack([_points(model, request), laid_xy_m])
+    flown_xy_m = np.vstack([_flown_to(model, request), laid_xy_m])
+    wider = looked_over(model, flown_xy_m, request.clearance().required_clearance_m) if look is None else look
     if wider is not model:  # a way around the fence may lead to other models of a catalogue
         model, job = wider, replace(job, grounds=Grounds(wider, request.surface.fill_hole_area_m2))
         home = home_from_dsm(model, (home.lat_deg, home.lon_deg))
@@ -159,12 +180,13 @@ def _planned_from(job: _Job, home: Home, why_moved: str) -> Plan:
     def is_enough(ground: Ground, plan: Plan) -> bool:
         return was_enough(ground, model, plan.line, plan.certificate, felt_m=feels_m)
 
-    return job.grounds.judged(
+    plan = job.grounds.judged(
         points_xy_m,
         least_margin_m(model, request),
         lambda ground: _planned(job, ground, home, why_moved, route),
         is_enough,
     )
+    return plan, model
 
 
 def _planned(job: _Job, ground: Ground, home: Home, why_moved: str, route: Route) -> Plan:
@@ -182,7 +204,7 @@ def _planned(job: _Job, ground: Ground, home: Home, why_moved: str, route: Route
     built = replace(built, mission=_signed(built.mission, job))
     job.report(CERTIFICATE_STEP, 0.8)
     line = read_back(built.mission, filled)
-    assumed = {**_assumptions(request, surfaces, holes), **job.assumptions}
+    assumed = {**_assumptions(request, surfaces, holes), **job.model.said_of_look, **job.assumptions}
     certificate = certify(filled, line, request.clearance_over(filled), ground=job.model, assumptions=assumed)
     predicted = predict_duration(built.mission, profile, filled)
     coverage = _coverage(filled, request, line)
@@ -267,11 +289,17 @@ def plan_trade(plan: Plan) -> list[Choice]:
 
 
 def _points(model: SurfaceModel, request: PlanRequest) -> np.ndarray:
-    """(N, 2) projected places that were asked for: points, home where it was given, a survey's area, rally points."""
+    """(N, 2) projected places that were asked for: those that are flown to, and a survey's area."""
+    area = [] if request.survey is None else request.survey.polygon_lat_lon_deg
+    area_m = model.xy_from_lat_lon(np.array(area, np.float64).reshape(-1, 2))
+    return np.vstack([_flown_to(model, request), area_m])
+
+
+def _flown_to(model: SurfaceModel, request: PlanRequest) -> np.ndarray:
+    """(N, 2) projected places: points, home where it was given, rally points."""
     places = [(poi.lat_deg, poi.lon_deg) for poi in request.pois]
     home = [request.home_lat_lon_deg] if request.home_lat_lon_deg is not None else []
-    area = [] if request.survey is None else request.survey.polygon_lat_lon_deg
-    asked_m = model.xy_from_lat_lon(np.array([*places, *home, *area]))
+    asked_m = model.xy_from_lat_lon(np.array([*places, *home]))
     return np.vstack([asked_m, rally_places(model, request.rally)])
 
 

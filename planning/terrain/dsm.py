@@ -42,6 +42,16 @@ class SurfaceModel(ABC):
     """How far from where it shows them things may stand, beside their cells; 0: it tells nothing of it."""
 
     @property
+    def most_place_m(self) -> float:
+        """The largest of it anywhere, where ``place_m`` is that around some places alone."""
+        return self.place_m
+
+    @property
+    def said_of_look(self) -> dict[str, object]:
+        """What a certificate writes down about the models around the flight, where it is of several."""
+        return {}
+
+    @property
     @abstractmethod
     def height_px(self) -> int: ...
 

@@ -71,7 +71,7 @@ def certify(
     ground, certificate = certify_part(
         source,
         flight,
-        params,
+        request.clearance(),
         max_hole_m2=model.max_hole_m2,
         assumptions={**opened.made, "vehicle_profile": vehicle.name},
     )

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mapping.geometry.arrays import F64
 from mapping.geometry.frames import apart_m
 from planning.basics.plan_model import Firmware, VehicleProfile
 from planning.certificate.certificate_model import ClearanceParams, Reason, with_accuracy
@@ -16,8 +17,8 @@ from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint, within_both
 from planning.guided.guided_model import RETURNS, Back, Demand, GuidedWay, Here, Look, Orbit, TakeOff, Wish
 from planning.guided.ways import guided_way
 from planning.margins.words import rounded_down, rounded_up
-from planning.planner.part import FLIGHT_MARGIN_M, needed_part, rally_places
-from planning.terrain.dsm import Dsm, SurfaceModel
+from planning.planner.part import needed_part, rally_places
+from planning.terrain.dsm import SCALE_TOLERANCE, Dsm, SurfaceModel
 from planning.terrain.holes import fill_holes
 from telemetry.errors import NotAllowedError
 from telemetry.flight.fence_heights import SAME_M, heights_aboard, lowest_way_m
@@ -78,14 +79,29 @@ def here_of(state: VehicleState, wish: Wish, now_s: float) -> Here:
     return Here((lat_deg, lon_deg), 0.0 if isinstance(wish, TakeOff) else up_m, (home.lat_deg, home.lon_deg))
 
 
-def part_for(model: SurfaceModel, state: VehicleState, wish: Wish, rally: tuple[RallyPoint, ...]) -> Dsm:
-    """Of the model, around vehicle, home, rally points and the place that is asked for."""
+def part_for(
+    model: SurfaceModel,
+    state: VehicleState,
+    wish: Wish,
+    rally: tuple[RallyPoint, ...],
+    required_clearance_m: float = 0.0,
+) -> Dsm:
+    """Of the model, around vehicle, home, rally points and the place, or the circle, that is asked for."""
     places = [(state.lat_deg, state.lon_deg), (state.home_lat_deg, state.home_lon_deg)]
     places.append(getattr(wish, "lat_lon_deg", None) or (None, None))
     places += [place[:2] for place in wish.flown] if isinstance(wish, Back) else []
     known = [place for place in places if None not in place]
     xy_m = model.xy_from_lat_lon(np.array(known, np.float64).reshape(-1, 2))
-    return needed_part(model, np.vstack([xy_m, rally_places(model, rally)]), FLIGHT_MARGIN_M)
+    places_m = np.vstack([xy_m, _circle_corners(model, wish), rally_places(model, rally)])
+    return needed_part(model, places_m, required_clearance_m)
+
+
+def _circle_corners(model: SurfaceModel, wish: Wish) -> F64:
+    """(N, 2) projected corners of the square around an orbit, which may lie outside the model; none without one."""
+    if not isinstance(wish, Orbit):
+        return np.empty((0, 2))
+    away_m = (1.0 + SCALE_TOLERANCE) * wish.radius_m * np.array([(-1.0, -1.0), (1.0, 1.0)])
+    return model.xy_from_lat_lon(np.array([wish.lat_lon_deg])) + away_m
 
 
 def nearest_rally(points: tuple[RallyPoint, ...], state: VehicleState) -> RallyPoint:

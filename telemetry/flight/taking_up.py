@@ -22,7 +22,7 @@ from planning.guided.guided_model import GuidedWay, Join
 from planning.missions.flown import flown_line
 from planning.missions.joined_mission import Joining, joined_mission, joining
 from planning.missions.mission_items import Place
-from planning.planner.part import FLIGHT_MARGIN_M, needed_part, rally_places
+from planning.planner.part import needed_part, rally_places
 from planning.terrain.dsm import Dsm
 from planning.terrain.holes import fill_holes
 from telemetry.errors import NotAllowedError
@@ -130,11 +130,11 @@ def _certified(part: _Part, mission: Mission, clearance: ClearanceParams) -> Cer
 
 
 def _part(over: FlownOver, xy_m: F64) -> _Part:
-    ground = needed_part(over.ground, xy_m, FLIGHT_MARGIN_M)
+    ground = needed_part(over.ground, xy_m)
     filled, _ = fill_holes(ground)
     if over.seen is None:
         return _Part(ground, None, filled, filled)
-    seen = needed_part(over.seen, xy_m, FLIGHT_MARGIN_M)
+    seen = needed_part(over.seen, xy_m)
     return _Part(ground, seen, filled, fill_holes(seen)[0])
 
 

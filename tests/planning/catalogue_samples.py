@@ -15,9 +15,11 @@ from pyproj import CRS
 
 from mapping.geometry.arrays import F32
 from planning.terrain.catalogue.best import Layer, seam_m
-from planning.terrain.catalogue.models import CatalogueModel
+from planning.terrain.catalogue.joined_models import Catalogue
+from planning.terrain.catalogue.models import CatalogueModel, Opened
 from planning.terrain.dsm import Dsm
 from planning.terrain.rasters.dsm_file import DsmFile
+from planning.terrain.rasters.header import RasterLimits
 
 WEST_M, NORTH_M = 500_000.0, 4_170_000.0
 
@@ -139,3 +141,19 @@ def worse_end(
             highest[place] = max(here.high_m[k] + layers[k].raise_m for k in counting)
             lowest[place] = min(here.low_m[k] - layers[k].drop_m for k in counting)
     return highest, lowest, best
+
+
+def tower_beside(east_m: float, off_m: float) -> tuple[Catalogue, Dsm]:
+    """A good model of 900 m by 900 m, in the midst of one of 2 km that is off in place; and the truth.
+
+    The coarser shows a tower of 80 m at ``east_m`` of its corner and so far south of where it is.
+    """
+    side, cell_m, south_m = 400, 5.0, 1002.5
+    shown, real = (np.zeros((side, side), np.float32) for _ in range(2))
+    shown[int((south_m + off_m) // cell_m), int(east_m // cell_m)] = 80.0
+    real[int(south_m // cell_m), int(east_m // cell_m)] = 80.0
+    survey = in_memory(shown, cell_m=cell_m, year=2010, name="survey", place_m=off_m, horizontal_m=off_m)
+    flat = np.zeros((180, 180), np.float32)
+    flight = in_memory(flat, cell_m=cell_m, year=2024, name="flight", east_m=550.0, south_m=550.0)
+    catalogue = Catalogue(Opened((flight, survey), (), ()), "c", RasterLimits())
+    return catalogue, Dsm(real, catalogue.transform, catalogue.crs, None, "truth")

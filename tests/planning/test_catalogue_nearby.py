@@ -136,7 +136,7 @@ def test_an_error_in_place_costs_clearance_where_its_model_counts() -> None:
     assert catalogue.place_m == 15.0
     inside, edge, outside = at((2000.0, 2000.0)), at((1500.0, 2000.0)), at((500.0, 500.0))
     assert [looked_over(catalogue, places).place_m for places in (inside, edge, outside)] == [0.0, 15.0, 15.0]
-    assert needed_part(catalogue, inside, FLIGHT_MARGIN_M).place_m == 0.0
+    assert needed_part(catalogue, inside).place_m == 0.0
     # A hole, in which the survey is the best.
     heights = flight().file.whole().elevation_m.copy()
     heights[200, 230] = np.nan

@@ -5,18 +5,21 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
-from planning.basics.plan_model import ANY_VEHICLE
+from planning.basics.plan_model import ANY_VEHICLE, FlownLine
 from planning.certificate.certificate_model import ClearanceParams
-from planning.guided.guided_model import GoTo, GuidedWay, ToHome, Wish
+from planning.certificate.clearance import certify
+from planning.guided.guided_model import GoTo, GuidedWay, Orbit, ToHome, Wish
 from planning.missions.vehicle_terms import budget_of
 from planning.terrain.dsm import Dsm
 from telemetry.errors import NotAllowedError
-from telemetry.flight.certified_way import Flown, judged_way, way_request
+from telemetry.flight.certified_way import Flown, judged_way, part_for, way_request
 from telemetry.flight.home_watch import HomePlace
 from telemetry.topics.requests import FlyWay, Operator
 from telemetry.topics.vehicle import VehicleState
+from tests.planning.catalogue_samples import NORTH_M, WEST_M, tower_beside
 from tests.planning.test_guided_ways import CLEARANCE, HOME, at, flat, model
 
 DSM = model(flat())
@@ -118,3 +121,21 @@ def test_no_way_is_asked_of_the_link_without_the_home_that_it_was_judged_for() -
     request = way_request(me, way, wish, home, speed_m_s=1.0, most_m_s=2.0)
     assert isinstance(request, FlyWay)
     assert request.home == home
+
+
+def test_a_wide_orbit_is_judged_with_the_errors_of_the_models_that_it_leads_over() -> None:
+    catalogue, truth = tower_beside(1477.5, 15.0)
+    ((lat, lon),) = catalogue.lat_lon_from_xy(np.array([[WEST_M + 1002.5, NORTH_M - 1002.5]])).tolist()
+    places = {"lat_deg": lat, "lon_deg": lon, "home_lat_deg": lat, "home_lon_deg": lon, "home_alt_amsl_m": 0.0}
+    wish = Orbit((lat, lon), 475.0, 30.0)
+    state = VehicleState(1, 1, **places)
+    part = part_for(catalogue, state, wish, ())
+    assert part.place_m == 15.0
+    assert part_for(catalogue, state, replace(wish, radius_m=20.0), ()).place_m == 0.0
+    budget = budget_of(ANY_VEHICLE, "guided")
+    clearance = ClearanceParams(budget.total_m, ANY_VEHICLE.radius_m, 0.3, rtl_height_m=30.0, budget=budget)
+    way = judged(wish, TOLD, dsm=part, clearance=clearance, alt_rel_home_m=30.0, **places)
+    assert way.problem is None
+    line = FlownLine(way.points_m, np.arange(len(way.points_m) - 1), tuple(way.points_m[0, :2]), 0.0, 30.0, True)
+    real = certify(truth, line, clearance)
+    assert real.min_distance_m >= clearance.required_clearance_m

@@ -1,8 +1,9 @@
 """A catalogue of surface models as one surface model: only the parts that are asked for are read and made.
 
 Its own grid is the finest model's. A flight looks at it ``over`` its places: on the grid of the finest model around
-them, whatever lies elsewhere. Any grid will do, no square is lower than what counts in it; plan, certificate and flight
-take the same one, for they ask with the same places and the same margin.
+them, whatever lies elsewhere. Any grid will do, no square is lower than what counts in it; plan, certificate and the
+flight of a mission take the same one, for they ask with the places that it flies to and the same margin. What it says
+of errors in place holds within that margin alone.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from planning.terrain.catalogue.best import (
 )
 from planning.terrain.catalogue.listed_models import LeftOut, listing_of
 from planning.terrain.catalogue.models import CatalogueModel, Opened, open_models
-from planning.terrain.catalogue.nearby import Bounds, is_aligned, place_near_m, those_near
+from planning.terrain.catalogue.nearby import Bounds, is_aligned, place_near_m, those_near, wider
 from planning.terrain.dsm import FLIGHT_MARGIN_M, Dsm, SurfaceModel
 from planning.terrain.rasters.dsm_file import AHEAD_PX
 from planning.terrain.rasters.header import RasterLimits, check_pixels
@@ -79,13 +80,24 @@ class Catalogue(SurfaceModel):
         self._finest = min(opened.models, key=lambda model: model.file.resolution_m)
         self.transform, self._shape = _grid_over(opened.models, self._finest)
         self.rms_m = min((model.rms_m for model in opened.models if model.rms_told), default=None)
-        self.place_m = max(model.place_m for model in opened.models)
+        self.place_m = self._most_place_m = max(model.place_m for model in opened.models)
         self.sha256 = _digest(self.layers, self.transform)
         self._notes = opened.notes
         self._kept: _Kept | None = None
         self._of: Catalogue = self
         self._looks: dict[tuple[str, float], Catalogue] = {}
         self._asked: dict[Bounds, Catalogue] = {}
+
+    @property
+    def most_place_m(self) -> float:
+        return self._most_place_m
+
+    @property
+    def said_of_look(self) -> dict[str, object]:
+        return {
+            "models_place_error_m": self.place_m,
+            "models_finest": f"{self._finest.name}, cells of {self.resolution_m:.3g} m",
+        }
 
     @property
     def height_px(self) -> int:
@@ -109,7 +121,10 @@ class Catalogue(SurfaceModel):
         return self.window(0, 0, *self._shape)
 
     def over(self, xy_m: F64, margin_m: float = FLIGHT_MARGIN_M) -> Catalogue:
-        """On the grid of the finest model around the places, with the largest horizontal error of those that count."""
+        """On the grid of the finest model around the places, with the largest horizontal error of those that count.
+
+        Raises RasterTooLargeError where the box around the places has too many of its cells.
+        """
         whole = self._of
         xy = whole._inside(xy_m)
         if not len(xy):
@@ -119,7 +134,7 @@ class Catalogue(SurfaceModel):
         if asked not in whole._asked:
             if len(whole._asked) >= MOST_ASKED:
                 whole._asked.pop(next(iter(whole._asked)))
-            whole._asked[asked] = whole._look(asked)
+            whole._asked[asked] = whole._look(asked, np.ptp(xy, axis=0))
         found = whole._asked[asked]
         for other in {whole, *whole._looks.values()} - {found}:
             other._kept = None
@@ -175,14 +190,23 @@ class Catalogue(SurfaceModel):
         xy = np.asarray(xy_m, dtype=np.float64).reshape(-1, 2)
         return xy[self._are_inside(xy)]
 
-    def _look(self, bounds_m: Bounds) -> Catalogue:
-        """Of this catalogue, within bounds: kept, so that what was made of it is not made again."""
+    def _look(self, bounds_m: Bounds, asked_m: F64) -> Catalogue:
+        """Of this catalogue, within bounds: kept, so that what was made of it is not made again.
+
+        ``asked_m``: (east, north) how long the box around the places is, without what lies around it.
+        """
         near = those_near(self.models, bounds_m)
         if not near:
             return self
         finest = min(near, key=lambda model: model.file.resolution_m)
         grid = _grid_over(self.models, finest)
-        place_m = place_near_m(self.layers, near, grid[0], bounds_m)
+        columns, rows = (math.ceil(float(side_m) / finest.file.resolution_m) for side_m in asked_m)
+        check_pixels(rows, columns, self._limits.max_px, where=self._where(finest))
+        told = watched(self._progress, where=self.name)
+        # One cell more: a part ends with the cell that the bounds lie in.
+        place_m = place_near_m(
+            self.layers, grid[0], wider(bounds_m, finest.file.resolution_m), lambda share: told(SURFACE_STAGE, share)
+        )
         key = finest.file.sha256, place_m
         if key not in self._looks:
             look = copy.copy(self)
@@ -203,8 +227,7 @@ class Catalogue(SurfaceModel):
         reach = math.ceil(farthest_seam_m(meeting(self.models, self._bounds_of(rows, columns))) / self.resolution_m) + 2
         around = _wider(rows, reach, self.height_px), _wider(columns, reach, self.width_px)
         shape = len_of(around[0]), len_of(around[1])
-        where = f"{self.name}, at the cells of {self._finest.name}, the finest model here ({self.resolution_m:.3g} m)"
-        check_pixels(*shape, self._limits.max_px, where=where)
+        check_pixels(*shape, self._limits.max_px, where=self._where(self._finest))
         check_memory(BYTES_PER_PX * shape[0] * shape[1], shape=shape, where=self.name)
         told = watched(self._progress, where=self.name)
         made = surface_of(
@@ -214,6 +237,10 @@ class Catalogue(SurfaceModel):
             progress=lambda share: told(SURFACE_STAGE, share),
         )
         return _Kept(rows, columns, made.part(_within(rows, around[0]), _within(columns, around[1])))
+
+    def _where(self, finest: CatalogueModel) -> str:
+        cell_m = finest.file.resolution_m
+        return f"{self.name}, at the cells of {finest.name}, the finest model here ({cell_m:.3g} m)"
 
     def _bounds_of(self, rows: slice, columns: slice) -> Bounds:
         """One square more on each side: what only touches the part is in."""

@@ -93,7 +93,8 @@ def fly(
         check_new(record)
     points = check_checklist(checklist, checklist_done_by)
     request = judged_by(flight, given, demands, mode)
-    model = None if dsm is None else read_around(dsm, StepTimer(progress), how, partial(mission_places, mission=flight))
+    places, demanded_m = partial(mission_places, mission=flight), request.clearance().required_clearance_m
+    model = None if dsm is None else read_around(dsm, StepTimer(progress), how, places, demanded_m)
     other = None if model is None else other_surface(flight, model)
     say_notes(other, *flight.warnings, fence_stays(flight))
     if model is None:

@@ -305,7 +305,7 @@ class _Flier:
         return judged_way(part, None, state, self._wish, flown, speed_m_s=self._speed_m_s, now_s=time.monotonic())
 
     def _part(self, state: VehicleState, flown: Flown) -> Dsm:
-        part = part_for(self._model.model, state, self._wish, flown.rally)
+        part = part_for(self._model.model, state, self._wish, flown.rally, flown.clearance.required_clearance_m)
         end_progress()
         self._model.say_part(part)
         return part

@@ -9,7 +9,7 @@ from typing import Any
 
 from mapping.geometry.arrays import F64
 from planning.errors import ParameterError
-from planning.planner.part import FLIGHT_MARGIN_M, needed_part
+from planning.planner.part import needed_part
 from planning.terrain.catalogue.joined_models import Catalogue
 from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.geotiff import open_dsm, open_models_of, read_dsm_reported
@@ -59,10 +59,16 @@ def open_model(path: Path, timer: StepTimer, options: ModelOptions) -> OpenedMod
     return OpenedModel(model, made, spikes_told=model.report is not None)
 
 
-def read_around(path: Path, timer: StepTimer, options: ModelOptions, places: Callable[[SurfaceModel], F64]) -> Dsm:
+def read_around(
+    path: Path,
+    timer: StepTimer,
+    options: ModelOptions,
+    places: Callable[[SurfaceModel], F64],
+    required_clearance_m: float = 0.0,
+) -> Dsm:
     """The part around the projected (N, 2) ``places`` of a flight; all of a small model."""
     opened = open_model(path, timer, options)
-    part = needed_part(opened.model, places(opened.model), FLIGHT_MARGIN_M)
+    part = needed_part(opened.model, places(opened.model), required_clearance_m)
     end_progress()
     opened.say_part(part)
     return part
@@ -112,7 +118,7 @@ def _read_catalogue(path: Path, timer: StepTimer, options: ModelOptions) -> tupl
     say_notes(*catalogue.warnings, *share_lines(catalogue, dsm))
     spikes, removed = find_spikes(dsm), options.remove_spikes
     _say_spikes(spikes, removed=removed)
-    made = _made_of(catalogue) | ({"spikes_removed": len(spikes)} if removed else {})
+    made = _made_of(catalogue) | catalogue.said_of_look | ({"spikes_removed": len(spikes)} if removed else {})
     return remove_spikes(dsm, spikes) if removed else dsm, made
 
 
