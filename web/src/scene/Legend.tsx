@@ -4,10 +4,14 @@ import { review } from "../store/review";
 import { result, terrain, view } from "../store/state";
 import { hasTraversability } from "../store/traversability";
 
+/** Not before the model is drawn, and plain ground has no heights to tell. */
+function hasHeights(): boolean {
+  const { legend_min_m, legend_max_m } = view.value;
+  return legend_min_m !== null && legend_max_m !== null && legend_min_m !== legend_max_m;
+}
+
 function HeightScale() {
   const { legend_min_m, legend_max_m } = view.value;
-  // Plain ground has no heights to tell.
-  if (legend_min_m === null || legend_max_m === null || legend_min_m === legend_max_m) return null;
   const datum = terrain.value?.vertical_datum ?? "the model's own datum";
   return (
     <span class="height-scale number" title={`Heights in ${datum}`}>
@@ -48,7 +52,7 @@ export function Legend() {
   // Colours on the ground keep the model on show.
   const isCovered = show_traversability && hasTraversability.value;
   const inPlace = points_state === "drawn" && show_points && !show_mesh && !isCovered;
-  const byHeight = inPlace ? !points_colored : shading === "height";
+  const byHeight = hasHeights() && (inPlace ? !points_colored : shading === "height");
   const isEmpty =
     !byHeight &&
     !points &&

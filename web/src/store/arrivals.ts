@@ -1,8 +1,9 @@
 import { effect, signal } from "@preact/signals";
 import type { TerrainDoc } from "../messages";
-import { sentFileOf } from "./files";
+import { sentFileOf, sentFiles } from "./files";
 import { edit } from "./plan";
-import { document_, library } from "./state";
+import { document_, jobs, library, notify } from "./state";
+import { drawer } from "./view";
 
 /** A surface model that this page sent and the open plan has not taken. */
 export const offered = signal<string | null>(null);
@@ -38,4 +39,17 @@ effect(() => {
     else if (sent) offered.value = entry.id;
   }
   seen = new Set(terrains.map((entry) => entry.id));
+});
+
+/** As in layout.css: so narrow, panels are drawers, and what failed would stand in one that is closed. */
+const NARROW = "(max-width: 1099px)";
+const told = new Set<string>();
+
+effect(() => {
+  for (const { id, state, error } of jobs.value.values()) {
+    if (state !== "failed" || !error || told.has(id) || !sentFiles.peek().has(id)) continue;
+    told.add(id);
+    const isTucked = typeof matchMedia === "function" && matchMedia(NARROW).matches;
+    if (isTucked && drawer.peek() !== "left") notify("error", error);
+  }
 });
