@@ -1,4 +1,4 @@
-"""The child process that decodes one raster, cloud or bag: a job comes on stdin, messages leave on stdout, JSON lines.
+"""The child process that decodes one raster, cloud, mesh or bag: a job comes on stdin, messages leave as lines of JSON.
 
 Started by ``planning.terrain.rasters.sandbox`` with GDAL's settings already in the environment. It imports
 little, so that it starts fast and its memory limit means something.
@@ -24,11 +24,12 @@ from planning.terrain.rasters.confinement import confine, confine_files
 Json = dict[str, Any]
 
 _OURS = __package__ or ""
-_KINDS = {"read_cloud": "cloud", "list_bag": "bag", "read_bag": "bag"}
+_KINDS = {"read_cloud": "cloud", "read_mesh": "mesh", "list_bag": "bag", "read_bag": "bag"}
 """Of a job's file; all others are rasters."""
 _SMALLER = {
     "raster": "Rewrite it as a tiled GeoTIFF.",
     "cloud": "Thin the cloud out, or crop it.",
+    "mesh": "Export the mesh with fewer faces and smaller textures.",
     "bag": "Cut a shorter piece out of it, or one with fewer topics.",
 }
 
