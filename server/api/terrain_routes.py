@@ -38,8 +38,10 @@ async def add_terrain(
     folder: Annotated[str, Query(max_length=1000)] = "",
     file_utc: Annotated[datetime | None, Query()] = None,
 ) -> Response:
-    """A GeoTIFF, an ESRI ASCII grid, a ZIP of tiles or of a mapping project, or a point cloud, told by the
-    content.
+    """A GeoTIFF, an ESRI ASCII grid, a ZIP of tiles or of a mapping project, a point cloud, or a textured
+    mesh (.glb, .gltf, a ZIP of 3D Tiles), told by the content.
+
+    A mesh is drawn in place of the surface model that is on show: a picture, by which nothing is judged.
 
     What the file does not say can be declared; empty: nothing is. ``cell_m`` and ``keep_noise`` are for clouds.
     """
@@ -97,6 +99,12 @@ async def add_orthophoto(
     name = display_name(filename)
     upload = await stream_to_disk(request, library.new_upload(suffix_of(name)))
     return answer(workspace.files.add_orthophoto(upload, name, terrain_id), 202)
+
+
+@router.delete("/meshes/{mesh_id}", **DONE)
+async def delete_mesh(mesh_id: str, workspace: Work) -> None:
+    """A textured mesh alone; its surface model stays."""
+    await workspace.files.delete_mesh(mesh_id)
 
 
 @router.post("/jobs/{job_id}/cancel", status_code=204)

@@ -23,13 +23,22 @@ from server.library import orthophotos, plans, terrains
 from server.library.directory_lock import DirectoryLock
 from server.library.documents import doc_from_profile
 from server.library.history import History
-from server.library.orthophotos import OrthophotoManifest
+from server.library.orthophotos import MeshManifest, OrthophotoManifest
 from server.library.plans import PlanSummary
 from server.library.reserve import Reserve
 from server.library.shelf import Shelf
 from server.library.terrains import TerrainManifest
 from server.library.whole_files import clean, new_id, storage_errors, write_atomically
-from server.schemas import ErrorDoc, LibraryMessage, LibraryState, OrthophotoDoc, PlanEntry, ProfileEntry, TerrainDoc
+from server.schemas import (
+    ErrorDoc,
+    LibraryMessage,
+    LibraryState,
+    MeshDoc,
+    OrthophotoDoc,
+    PlanEntry,
+    ProfileEntry,
+    TerrainDoc,
+)
 from server.schemas.station_docs import FIRST_VEHICLE
 
 VEHICLES = "vehicles"
@@ -60,6 +69,9 @@ class Library:
             self._orthophotos = Shelf(
                 self.root, kind="orthophoto", folder=orthophotos.FOLDER, model=OrthophotoManifest, on_damage=told
             )
+            self._meshes = Shelf(
+                self.root, kind="textured mesh", folder=orthophotos.MESHES, model=MeshManifest, on_damage=told
+            )
             self._plans = Shelf(self.root, kind="plan", folder=plans.FOLDER, model=PlanSummary, on_damage=told)
             self._profiles, unreadable = read_profiles(self.root / _PROFILES)
             self.notices += unreadable + _remove_unneeded(self.root)
@@ -74,16 +86,22 @@ class Library:
         """Takes in what worker processes have stored."""
         self._terrains.refresh()
         self._orthophotos.refresh()
+        self._meshes.refresh()
 
     def clear_unfinished(self) -> None:
         """Removes what a killed worker left half-stored; only while no worker stores anything."""
         self._terrains.clear_unfinished()
         self._orthophotos.clear_unfinished()
+        self._meshes.clear_unfinished()
 
     def state(self) -> LibraryState:
         """From memory: quick enough for the event loop."""
         return LibraryState(
-            terrains=self.terrains(), orthophotos=self.orthophotos(), plans=self.plans(), profiles=self.profiles()
+            terrains=self.terrains(),
+            orthophotos=self.orthophotos(),
+            meshes=self.meshes(),
+            plans=self.plans(),
+            profiles=self.profiles(),
         )
 
     def message(self) -> LibraryMessage:
@@ -116,12 +134,15 @@ class Library:
         return terrains.load_terrain(self.terrain_dir(terrain_id))
 
     def delete_terrain(self, terrain_id: str) -> None:
-        """With its orthophotos. Whether a plan still needs it is the caller's question (``plans_using``)."""
+        """With its orthophotos and meshes. Whether a plan still needs it is the caller's question (``plans_using``)."""
         with self._change:
             self.terrain_dir(terrain_id)
             for photo in self.orthophotos():
                 if photo.terrain_id == terrain_id:
                     self._orthophotos.remove(photo.id)
+            for mesh in self.meshes():
+                if mesh.terrain_id == terrain_id:
+                    self._meshes.remove(mesh.id)
             self._terrains.remove(terrain_id)
 
     def orthophotos(self) -> list[OrthophotoDoc]:
@@ -137,6 +158,22 @@ class Library:
     def delete_orthophoto(self, photo_id: str) -> None:
         with self._change:
             self._orthophotos.remove(photo_id)
+
+    def meshes(self) -> list[MeshDoc]:
+        """Oldest first."""
+        return sorted((m.doc for m in self._meshes.manifests.values()), key=lambda doc: doc.added_utc)
+
+    def mesh_of(self, terrain_id: str | None) -> MeshDoc | None:
+        """The newest one of a surface model."""
+        return next((doc for doc in reversed(self.meshes()) if doc.terrain_id == terrain_id), None)
+
+    def mesh_dir(self, mesh_id: str) -> Path:
+        """The folder of a textured mesh; raises ``NotFoundError``."""
+        return self._meshes.directory(mesh_id)
+
+    def delete_mesh(self, mesh_id: str) -> None:
+        with self._change:
+            self._meshes.remove(mesh_id)
 
     # Plans
 

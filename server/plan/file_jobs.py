@@ -14,7 +14,7 @@ from server.plan import file_tasks
 from server.plan.archives import remove_upload
 from server.plan.on_show import OnShow
 from server.plan.plan_desk import PlanDesk
-from server.schemas import ErrorDoc, JobDoc, NoticeMessage, OrthophotoDoc, Pages, PlanDoc, TerrainDoc
+from server.schemas import ErrorDoc, JobDoc, MeshDoc, NoticeMessage, OrthophotoDoc, Pages, PlanDoc, TerrainDoc
 from server.work.job_board import JobBoard
 from server.work.jobs import Lane, Progress
 
@@ -42,8 +42,11 @@ class FileJobs:
     ) -> JobDoc:
         """Reads an uploaded model or point cloud; the open plan takes it unless it has points on another one."""
 
+        under_id = self._on_show.terrain_id
+        under = None if under_id is None else (under_id, self._library.terrain_dir(under_id))
+
         async def work(lane: Lane, progress: Progress) -> None:
-            terrain: TerrainDoc = await self._made(
+            terrain: TerrainDoc | MeshDoc = await self._made(
                 lane.call(
                     file_tasks.import_terrain,
                     self._library.root,
@@ -56,9 +59,13 @@ class FileJobs:
                     remove_spikes=remove_spikes,
                     cell_m=cell_m,
                     keep_noise=keep_noise,
+                    under=under,
                     progress=progress,
                 ),
             )
+            if isinstance(terrain, MeshDoc):
+                await self._lay(terrain)
+                return
             photos = [photo.id for photo in self._library.orthophotos() if photo.terrain_id == terrain.id]
             if terrain.in_doubt:
                 self._pages.publish(_not_taken(terrain))
@@ -99,6 +106,30 @@ class FileJobs:
             await self._desk.propose(lambda document: _swap(document, terrain_id, terrain))
 
         return self._board.start("Removing spikes", work)
+
+    async def delete_mesh(self, mesh_id: str) -> None:
+        """The model that gave way to it is drawn again. Raises NotFoundError."""
+        self._library.mesh_dir(mesh_id)
+        shown = self._library.mesh_of(self._on_show.terrain_id)
+        await asyncio.to_thread(self._library.delete_mesh, mesh_id)
+        self._pages.publish(self._library.message())
+        if shown is not None and shown.id == mesh_id:
+            self._on_show.hide_textured()
+
+    async def _lay(self, mesh: MeshDoc) -> None:
+        """On show at once where its model is; those that the model had before are gone."""
+        try:
+            self._library.terrain_dir(mesh.terrain_id)
+        except NotFoundError:
+            # Its surface model was deleted while it was read.
+            await self.delete_mesh(mesh.id)
+            raise
+        for doc in self._library.meshes():
+            if doc.terrain_id == mesh.terrain_id and doc.id != mesh.id:
+                await asyncio.to_thread(self._library.delete_mesh, doc.id)
+        self._pages.publish(self._library.message())
+        if self._on_show.terrain_id == mesh.terrain_id:
+            self._on_show.show_textured()
 
     async def _drape(self, photo: OrthophotoDoc) -> None:
         try:

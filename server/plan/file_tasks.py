@@ -27,9 +27,10 @@ from server.library.terrains import Origin, TerrainManifest, load_terrain, spike
 from server.plan import archives
 from server.plan.cloud_points import points_to_keep, write_points
 from server.plan.cloud_task import import_cloud
+from server.plan.mesh_task import import_mesh, mesh_of
 from server.plan.project_task import Unpacked, import_project, project_in, unpacked_project
 from server.plan.tile_archive import unpacked_tiles
-from server.schemas import OrthophotoDoc, PlanDoc, TerrainDoc
+from server.schemas import MeshDoc, OrthophotoDoc, PlanDoc, TerrainDoc
 from server.work.jobs import Progress
 
 _HEIGHTS_OF_BEFORE = {"canopy_greatest_m": None, "canopy_median_m": None, "canopy_share": None}
@@ -55,9 +56,18 @@ def import_terrain(
     remove_spikes: bool,
     cell_m: float | None,
     keep_noise: bool,
+    under: tuple[str, Path] | None = None,
     report: Progress,
-) -> TerrainDoc:
-    """Reads an uploaded surface model, a file, tiles or a point cloud, into the library. Raises RasterError."""
+) -> TerrainDoc | MeshDoc:
+    """Reads an uploaded surface model, a file, tiles or a point cloud, into the library. Raises RasterError.
+
+    A textured mesh is laid on the surface model ``under`` it, by its id and folder.
+    """
+    with archives.named(upload, filename):
+        if mesh := mesh_of(upload, filename):
+            terrain_id, terrain_dir = under or ("", None)
+            names = None if mesh is True else mesh
+            return import_mesh(root, upload, filename, names, terrain_dir, terrain_id, report=report)
     with archives.named(upload, filename), _unpacked(upload, filename, report) as source:
         if is_cloud(upload):
             params = CloudParams(cell_m, crs, vertical_datum, z_scale, keep_noise)

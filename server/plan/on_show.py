@@ -76,6 +76,22 @@ class OnShow:
     def show_orthophoto(self) -> None:
         self.show_view(self.view.model_copy(update={"shading": "orthophoto"}))
 
+    def show_textured(self) -> None:
+        """The mesh that has just come, in the surface model's place."""
+        self.show_view(self.view.model_copy(update={"show_textured": True, "show_mesh": False}))
+
+    def hide_textured(self) -> None:
+        """The mesh is gone: the surface model is drawn again where it had given way to it, and not to its points."""
+        gave_way = self.view.show_textured and not self.view.show_points
+        update = {"show_textured": False, "show_mesh": self.view.show_mesh or gave_way}
+        self.show_view(self.view.model_copy(update=update))
+
+    @property
+    def terrain_id(self) -> str | None:
+        """Of the surface model on show, the plan's or that of the recording that is open."""
+        review = self._picture.review
+        return self.document.terrain_id if review is None else review[0]
+
     def show_review(self, terrain_id: str | None, scene: ReviewScene | None) -> None:
         """A recording in the 3D view instead of the plan; None: the plan again."""
         self._picture.show_review(terrain_id, scene)
@@ -88,7 +104,7 @@ class OnShow:
     def tell_legend(self) -> None:
         """The heights that the colours mean, and the points there are, change with the surface model on show."""
         low_m, high_m = self._picture.legend_m or (None, None)
-        cloud = self._picture.cloud
+        cloud, mesh = self._picture.cloud, self._picture.mesh
         self.view = self.view.model_copy(
             update={
                 "legend_min_m": low_m,
@@ -97,6 +113,8 @@ class OnShow:
                 "points_state": self._picture.points_state,
                 "points_of": 0 if cloud is None else cloud.points,
                 "points_colored": cloud is not None and cloud.colored,
+                "textured_triangles": 0 if mesh is None else mesh.triangles,
+                "textured_state": self._picture.textured_state,
             }
         )
         self._pages.publish(ViewMessage(view=self.view))

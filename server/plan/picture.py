@@ -13,6 +13,7 @@ import numpy as np
 from planning.terrain.dsm import Dsm
 from server.errors import JobCancelledError, NotFoundError, reported
 from server.library import Library
+from server.library.orthophotos import load_mesh
 from server.plan import tasks
 from server.scene.geometry.payload import (
     OverlayScene,
@@ -22,6 +23,7 @@ from server.scene.geometry.payload import (
     SceneState,
     SiteMark,
     TerrainScene,
+    TexturedScene,
 )
 from server.scene.geometry.plain import plain_around, plain_scene
 from server.scene.layers.vehicles import actor_of
@@ -31,6 +33,7 @@ from server.schemas import (
     CursorMessage,
     ErrorDoc,
     FrameView,
+    MeshDoc,
     NoticeMessage,
     Pages,
     PlanDoc,
@@ -73,6 +76,10 @@ class Picture:
         self._points_of: str | None = None
         """Model whose points were asked for: those that cannot be had are asked for once while they are wanted."""
         self._points_state: PointsState = "none"
+        self._textured: TexturedScene | None = None
+        self._textured_of: str | None = None
+        """Mesh that was asked for, as of the points."""
+        self._textured_state: PointsState = "none"
         self._overlay: tuple[OverlayScene | None, tuple[SiteMark, ...]] = (None, ())
 
     @property
@@ -88,6 +95,17 @@ class Picture:
             return None
         cloud = next((doc.cloud for doc in self._library.terrains() if doc.id == terrain_id), None)
         return cloud if cloud is not None and cloud.shown else None
+
+    @property
+    def mesh(self) -> MeshDoc | None:
+        """The textured mesh of the surface model on show."""
+        terrain_id = None if self._terrain is None or self._terrain_key is None else self._terrain_key[0]
+        return None if terrain_id is None else self._library.mesh_of(terrain_id)
+
+    @property
+    def textured_state(self) -> PointsState:
+        """What has become of that mesh."""
+        return self._textured_state
 
     @property
     def points_state(self) -> PointsState:
@@ -157,6 +175,7 @@ class Picture:
         else:
             await self._load_terrain(document.terrain_id, document.orthophoto_id, view.shading)
         await self._load_points(wanted=view.show_points)
+        await self._load_textured(wanted=view.show_textured)
         overlay, sites = self._overlay
         if overlay is None or overlay.terrain_id != document.terrain_id:
             overlay, sites = None, ()
@@ -171,6 +190,7 @@ class Picture:
             overlay=overlay,
             sites=sites,
             points=self._points,
+            textured=self._textured,
         )
         await self._view.show(self._dsm, state)
 
@@ -256,6 +276,35 @@ class Picture:
     def _tell_points(self, state: PointsState) -> None:
         if state != self._points_state:
             self._points_state = state
+            self._changed()
+
+    async def _load_textured(self, *, wanted: bool) -> None:
+        """That of the model on show, once it is wanted; another one is let go."""
+        mesh = self.mesh
+        if not wanted and self._textured is None:
+            self._textured_of = None  # what failed is asked for again
+            self._tell_textured("none")
+        if (None if mesh is None else mesh.id) == self._textured_of:
+            return
+        self._textured, self._textured_of = None, None
+        if mesh is None or not wanted:
+            self._tell_textured("none")
+            return
+        self._textured_of = mesh.id
+        self._tell_textured("loading")
+        try:
+            glb, origin_m = await asyncio.to_thread(load_mesh, self._library.mesh_dir(mesh.id))
+            self._textured = TexturedScene(mesh.terrain_id, mesh.id, glb, origin_m)
+            self._tell_textured("drawn")
+        except NotFoundError:
+            self._tell_textured("none")
+        except Exception as error:
+            self._tell_textured("failed")
+            self._tell(reported(error, log, "Drawing the textured mesh"))
+
+    def _tell_textured(self, state: PointsState) -> None:
+        if state != self._textured_state:
+            self._textured_state = state
             self._changed()
 
     def _tell(self, error: ErrorDoc) -> None:

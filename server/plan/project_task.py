@@ -15,6 +15,8 @@ from planning.terrain.clouds.read import CloudModel, CloudParams, read_cloud
 from planning.terrain.clouds.thin import ThinnedCloud
 from planning.terrain.dsm import Dsm
 from planning.terrain.geotiff import read_dsm_reported, read_orthophoto
+from planning.terrain.meshes.mesh_file import MeshNames, mesh_in
+from planning.terrain.meshes.on_model import PlacedMesh
 from planning.terrain.orthophoto import Orthophoto
 from planning.terrain.projects import Project, doubts_of_name, project_of, shortened
 from server.errors import BadRequestError, StorageFullError
@@ -24,6 +26,7 @@ from server.plan import archives
 from server.plan.beside_model import offset_of, placed_on
 from server.plan.cloud_points import write_points
 from server.plan.cloud_task import MOST_POINTS, cloud_beside_doc
+from server.plan.mesh_task import keep, laid_on
 from server.schemas import CloudDoc, TerrainDoc
 from server.work.jobs import Progress
 
@@ -42,6 +45,9 @@ class Unpacked:
     orthophoto: Path | None
     cloud: Path | None
     offset: Path | None
+    mesh: MeshNames | None = None
+    archive: Path | None = None
+    """In which its textured mesh is read where it lies."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,11 +93,12 @@ def unpacked_project(upload: Path, filename: str, project: Project, report: Prog
     with tempfile.TemporaryDirectory(dir=upload.parent, prefix=f"{upload.stem}-") as directory:
         folder = Path(directory, "project")
         with archives.opened(upload, filename) as archive:
+            mesh = mesh_in(member.filename for member in archive.infolist() if not member.is_dir())
             members = {own[name]: archive.getinfo(name) for name in own}
             archives.unpack(archive, members, folder, filename, most_bytes=_MOST_BYTES, report=report)
         model, *others = (None if name is None else folder / own[name] for name in wanted)
         assert model is not None
-        yield Unpacked(project, model, *others)
+        yield Unpacked(project, model, *others, mesh=mesh, archive=upload)
 
 
 def import_project(
@@ -110,6 +117,7 @@ def import_project(
         )
     found.model.unlink(missing_ok=True)  # there may be room for what is read, and not for both
     photo, cloud = _photo(found, dsm, report), _cloud(found, dsm, params, report)
+    mesh, mesh_notes = _mesh(found, dsm, report)
     report("Storing", None)
     _check_room(root, dsm, photo, cloud)
     left = () if said.spikes_removed else said.spikes
@@ -124,6 +132,7 @@ def import_project(
             *doubts_of_name(found.project.model or ""),
             *photo.notes,
             *cloud.notes,
+            *mesh_notes,
             *_left_out(found.project),
         ],
         cloud=cloud.doc,
@@ -134,6 +143,9 @@ def import_project(
         name = shortened(PurePosixPath(found.project.orthophoto or "").name)
         with _undone(root / FOLDER / doc.id):
             store_orthophoto(root, photo.photo, name=name, terrain_id=doc.id)
+    if mesh is not None and found.mesh is not None:
+        with _undone(root / FOLDER / doc.id):
+            keep(root, mesh, name=shortened(found.mesh.entry), terrain_id=doc.id)
     return doc
 
 
@@ -195,6 +207,16 @@ def _photo(found: Unpacked, dsm: Dsm, report: Progress) -> Beside:
         return Beside(notes=(f"The orthophoto is left out. {error}",))
     finally:
         path.unlink(missing_ok=True)
+
+
+def _mesh(found: Unpacked, dsm: Dsm, report: Progress) -> tuple[PlacedMesh | None, tuple[str, ...]]:
+    """One that cannot be laid on the model is left out, and that is said."""
+    if found.mesh is None or found.archive is None:
+        return None, ()
+    try:
+        return laid_on(dsm, found.archive, shortened(found.mesh.entry), found.mesh, report), ()
+    except PlanningError as error:
+        return None, (f"The textured mesh is left out. {error}",)
 
 
 def _cloud(found: Unpacked, dsm: Dsm, params: CloudParams, report: Progress) -> Beside:

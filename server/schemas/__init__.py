@@ -52,6 +52,7 @@ from server.schemas.library_docs import (
     CloudShareDoc,
     JobDoc,
     LibraryState,
+    MeshDoc,
     OrthophotoDoc,
     PlanEntry,
     ProfileEntry,

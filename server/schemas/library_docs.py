@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
+from pydantic import Field
+
 from server.schemas.plan_docs import PlaceDoc, ProfileDoc
 from server.schemas.result_docs import ErrorDoc
 from server.schemas.strict_model import Strict
@@ -91,6 +93,19 @@ class OrthophotoDoc(Strict):
     added_utc: str
 
 
+class MeshDoc(Strict):
+    """A textured mesh that is drawn in a surface model's place: a picture, by which nothing is judged."""
+
+    id: str
+    name: str
+    terrain_id: str
+    triangles: int
+    shift_m: float
+    """By how much its heights were moved onto the model's; 0: they are its own."""
+    notes: list[str]
+    added_utc: str
+
+
 class PlanEntry(Strict):
     id: str
     name: str
@@ -106,6 +121,8 @@ class ProfileEntry(Strict):
 class LibraryState(Strict):
     terrains: list[TerrainDoc]
     orthophotos: list[OrthophotoDoc]
+    meshes: list[MeshDoc] = Field(default=[])
+    """Of each surface model the newest one is drawn."""
     plans: list[PlanEntry]
     profiles: list[ProfileEntry]
 

@@ -17,8 +17,10 @@ class ViewDoc(Strict):
     shading: Literal["height", "hillshade", "orthophoto"] = "height"
     show_points: bool = False
     """The points of the cloud that the surface model on show was made of."""
+    show_textured: bool = False
+    """The textured mesh that belongs to the surface model on show: a picture, by which nothing is judged."""
     show_mesh: bool = True
-    """The surface model itself beside its points; without them it is always shown."""
+    """The surface model itself beside its points or its textured mesh; without them it is always shown."""
     show_surface: bool = True
     show_path: bool = True
     show_unknown: bool = True
@@ -48,6 +50,10 @@ class ViewDoc(Strict):
     """Points of the file that they are of."""
     points_colored: bool = False
     """By the file; else by height, as the model is."""
+    textured_triangles: int = 0
+    """Of the textured mesh that the surface model on show has; 0: it has none."""
+    textured_state: Literal["none", "loading", "drawn", "failed"] = "none"
+    """What has become of it, as of the points."""
 
 
 class SelectionDoc(Strict):

@@ -304,7 +304,8 @@ def test_what_a_job_stored_before_it_failed_is_told_to_the_pages(library: Librar
 
     pages = Told()
     board: Any = SimpleNamespace(start=lambda name, work, clean: works.append(work))
-    files = FileJobs(library, board, cast("Any", None), cast("Any", None), pages)
+    on_show: Any = SimpleNamespace(terrain_id=None)
+    files = FileJobs(library, board, cast("Any", None), on_show, pages)
     files.add_terrain(tmp_path / "b", "b.zip", crs=None, z_scale=None, vertical_datum=None, remove_spikes=False)
     with pytest.raises(JobCancelledError):
         asyncio.run(works[0](SimpleNamespace(call=call), lambda *_: None))

@@ -52,7 +52,7 @@ def test_a_recording_is_drawn_on_it_and_the_plan_comes_back_afterwards() -> None
 
     dsm = hill()
     library: Any = SimpleNamespace(
-        orthophotos=list, terrains=list, terrain_dir=lambda _: None, load_terrain=lambda _: dsm
+        orthophotos=list, terrains=list, mesh_of=lambda _: None, terrain_dir=lambda _: None, load_terrain=lambda _: dsm
     )
 
     async def call(*_: object) -> object:

@@ -106,7 +106,11 @@ def test_points_are_read_when_they_are_wanted_once_and_told_before() -> None:
 
     docs = [SimpleNamespace(id="hill", cloud=CLOUD)]
     library: Any = SimpleNamespace(
-        orthophotos=list, terrains=lambda: docs, terrain_dir=lambda _: None, load_terrain=lambda _: DSM
+        orthophotos=list,
+        terrains=lambda: docs,
+        mesh_of=lambda _: None,
+        terrain_dir=lambda _: None,
+        load_terrain=lambda _: DSM,
     )
     view: Any = SimpleNamespace(show=show)
     lane: Any = SimpleNamespace(call=call)
@@ -160,7 +164,11 @@ def test_points_that_failed_are_asked_for_again_once_they_were_put_off() -> None
             shown.release()
 
         library: Any = SimpleNamespace(
-            orthophotos=list, terrains=lambda: docs, terrain_dir=lambda _: None, load_terrain=lambda _: DSM
+            orthophotos=list,
+            terrains=lambda: docs,
+            mesh_of=lambda _: None,
+            terrain_dir=lambda _: None,
+            load_terrain=lambda _: DSM,
         )
         told = Told()
         made: list[Picture] = []

@@ -12,8 +12,9 @@ from affine import Affine
 
 from planning.terrain.dsm import Dsm
 from server.library.terrains import load_terrain
-from server.schemas import Computation, PlanDoc, PoiDoc, TerrainDoc
-from tests.planning.geotiff_samples import geotiff
+from server.schemas import Computation, PlanDoc, PoiDoc, Snapshot, TerrainDoc, ViewMessage
+from tests.planning.geotiff_samples import geotiff, write_raster
+from tests.planning.mesh_samples import dsm_of, packed, tileset
 from tests.server.station import Station, ok, station
 
 pytestmark = pytest.mark.xdist_group("terrains")
@@ -121,6 +122,44 @@ def test_an_orthomosaic_is_draped_only_where_it_belongs(fresh: Station, tmp_path
     )
     assert answer.status_code == 404
     assert fresh.uploads_left() == []
+
+
+def test_a_mesh_is_drawn_in_the_models_place_and_deleted_alone(fresh: Station, tmp_path: Path) -> None:
+    dsm = dsm_of()
+    raster = write_raster(tmp_path / "dsm.tif", np.array(dsm.elevation_m), crs="EPSG:32633", transform=dsm.transform)
+    terrain = added(fresh, "under.tif", raster.read_bytes())
+    data = packed(tmp_path / "survey.zip", tileset(dsm)).read_bytes()
+    assert fresh.upload("first.zip", data).state == "done"
+    assert fresh.upload("second.zip", data).state == "done"
+    (mesh,) = fresh.library.meshes
+    assert (mesh.name, mesh.terrain_id) == ("second.zip", terrain.id)
+    assert (
+        fresh.until(lambda m: isinstance(m, ViewMessage) and m.view.textured_state == "drawn").view.show_mesh is False
+    )
+    folder = fresh.server.settings.data_dir / "meshes"
+    assert [each.name for each in folder.iterdir()] == [mesh.id]
+
+    assert fresh.http.delete(f"/api/meshes/{mesh.id}").status_code == 204
+    view = fresh.until(lambda m: isinstance(m, ViewMessage) and m.view.textured_state == "none").view
+    assert (view.show_textured, view.show_mesh, view.textured_triangles) == (False, True, 0)
+    assert (fresh.library.meshes, list(folder.iterdir())) == ([], [])
+    assert terrain in fresh.library.terrains
+    assert fresh.http.delete(f"/api/meshes/{mesh.id}").status_code == 404
+
+
+def test_a_mesh_of_another_model_is_deleted_and_the_view_stays(fresh: Station, tmp_path: Path) -> None:
+    dsm = dsm_of()
+    raster = write_raster(tmp_path / "dsm.tif", np.array(dsm.elevation_m), crs="EPSG:32633", transform=dsm.transform)
+    added(fresh, "under.tif", raster.read_bytes())
+    assert fresh.upload("survey.zip", packed(tmp_path / "survey.zip", tileset(dsm)).read_bytes()).state == "done"
+    other = added(fresh, "other.tif", slope())
+    fresh.change("Other", terrain_id=other.id)
+    before = Snapshot.model_validate_json(fresh.http.get("/api/state").text).view
+    assert before.show_textured
+    (mesh,) = fresh.library.meshes
+    assert fresh.http.delete(f"/api/meshes/{mesh.id}").status_code == 204
+    assert fresh.library.meshes == []
+    assert Snapshot.model_validate_json(fresh.http.get("/api/state").text).view.show_textured
 
 
 def test_spikes_are_removed_into_a_model_of_its_own(fresh: Station) -> None:

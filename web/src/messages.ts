@@ -1239,6 +1239,18 @@ export interface OrthophotoDoc {
   added_utc: string;
 }
 
+/** A textured mesh that is drawn in a surface model's place: a picture, by which nothing is judged. */
+export interface MeshDoc {
+  id: string;
+  name: string;
+  terrain_id: string;
+  triangles: number;
+  /** By how much its heights were moved onto the model's; 0: they are its own. */
+  shift_m: number;
+  notes: string[];
+  added_utc: string;
+}
+
 export interface PlanEntry {
   id: string;
   name: string;
@@ -1254,6 +1266,8 @@ export interface ProfileEntry {
 export interface LibraryState {
   terrains: TerrainDoc[];
   orthophotos: OrthophotoDoc[];
+  /** Of each surface model the newest one is drawn. */
+  meshes: MeshDoc[];
   plans: PlanEntry[];
   profiles: ProfileEntry[];
 }
@@ -1274,7 +1288,9 @@ export interface ViewDoc {
   shading: "height" | "hillshade" | "orthophoto";
   /** The points of the cloud that the surface model on show was made of. */
   show_points: boolean;
-  /** The surface model itself beside its points; without them it is always shown. */
+  /** The textured mesh that belongs to the surface model on show: a picture, by which nothing is judged. */
+  show_textured: boolean;
+  /** The surface model itself beside its points or its textured mesh; without them it is always shown. */
   show_mesh: boolean;
   show_surface: boolean;
   show_path: boolean;
@@ -1305,6 +1321,10 @@ export interface ViewDoc {
   points_of: number;
   /** By the file; else by height, as the model is. */
   points_colored: boolean;
+  /** Of the textured mesh that the surface model on show has; 0: it has none. */
+  textured_triangles: number;
+  /** What has become of it, as of the points. */
+  textured_state: "none" | "loading" | "drawn" | "failed";
 }
 
 /** Which tool clicks in the 3D view act through, and what is selected. */

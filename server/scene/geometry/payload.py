@@ -57,6 +57,18 @@ class PointsScene:
 
 
 @dataclass(frozen=True, slots=True)
+class TexturedScene:
+    """The textured mesh of a surface model: a picture."""
+
+    terrain_id: str
+    mesh_id: str
+    glb: bytes
+    """z up, metres from ``origin_m``"""
+    origin_m: F64
+    """(3,) x, y, alt_dsm"""
+
+
+@dataclass(frozen=True, slots=True)
 class PlanScene:
     """A computed plan as the view draws it; all points are x, y, alt_dsm."""
 
@@ -135,3 +147,5 @@ class SceneState:
     sites: tuple[SiteMark, ...] = ()
     points: PointsScene | None = None
     """Of the surface model on show, once they are wanted and at hand."""
+    textured: TexturedScene | None = None
+    """Likewise."""

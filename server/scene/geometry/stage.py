@@ -14,7 +14,7 @@ from skimage import measure
 from mapping.geometry.arrays import F64
 from planning.terrain.dsm import Dsm
 from server.scene.geometry.mesh import drawn_alt_dsm_m, filled
-from server.scene.geometry.payload import HeightGrid, PointsScene, SceneState, TerrainScene
+from server.scene.geometry.payload import HeightGrid, PointsScene, SceneState, TerrainScene, TexturedScene
 from server.scene.geometry.scene_frame import LocalFrame
 
 _LARGEST_BODY_M = 0.9
@@ -65,9 +65,17 @@ class Drawing:
         return found if found is not None and found.terrain_id == self.terrain.terrain_id else None
 
     @property
+    def textured(self) -> TexturedScene | None:
+        """The textured mesh, while it is drawn."""
+        found = self.state.textured if self.state.view.show_textured else None
+        return found if found is not None and found.terrain_id == self.terrain.terrain_id else None
+
+    @property
     def has_mesh(self) -> bool:
-        """Without its points, and under colours that are laid over it, the model is drawn whatever the view says."""
-        return self.state.view.show_mesh or self.points is None or self.state.overlay is not None
+        """Without its points or its textured mesh, and under colours that are laid over it, the model is drawn whatever
+        the view says."""
+        alone = self.points is None and self.textured is None
+        return self.state.view.show_mesh or alone or self.state.overlay is not None
 
     def places_xy_m(self, places: Sequence[_Place]) -> F64:
         """(N, 2) projected"""

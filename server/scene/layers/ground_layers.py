@@ -48,6 +48,17 @@ def points_nodes(drawing: Drawing) -> list[Node]:
     return [Node("/points", "point_cloud", props)]
 
 
+def textured_nodes(drawing: Drawing) -> list[Node]:
+    """The textured mesh, in the model's place."""
+    mesh, frame = drawing.textured, drawing.frame
+    if mesh is None:
+        return []
+    x, y, z = frame.scene_from_model(mesh.origin_m).tolist()
+    # A name of its own for each: another mesh is another node.
+    node = _glb_node(f"/textured/{mesh.mesh_id}", mesh.glb, drawing)
+    return [Node(node.name, node.kind, {**node.props, "position": (x, y, z)})]
+
+
 def unknown_nodes(drawing: Drawing) -> list[Node]:
     """Hatched plates where the model knows nothing: no one takes them for ground."""
     grid = drawing.terrain.grid

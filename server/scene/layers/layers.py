@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from server.scene.geometry.canvas import Node, Ready
-from server.scene.geometry.payload import OverlayScene, PlanScene, PointsScene, ReviewScene, TerrainScene
+from server.scene.geometry.payload import OverlayScene, PlanScene, PointsScene, ReviewScene, TerrainScene, TexturedScene
 from server.scene.geometry.stage import Drawing
 from server.scene.layers.fence_layer import fence_nodes
 from server.scene.layers.flight_layers import flight_nodes, review_nodes
-from server.scene.layers.ground_layers import points_nodes, surface_nodes, terrain_nodes, unknown_nodes
+from server.scene.layers.ground_layers import points_nodes, surface_nodes, terrain_nodes, textured_nodes, unknown_nodes
 from server.scene.layers.mark_layers import is_first_home, place_nodes, poi_nodes
 from server.scene.layers.site_layer import site_nodes
 
@@ -19,7 +19,7 @@ _POIS, _FENCE = "pois", "fence"
 MARKS = (_POIS, _FENCE)
 """Layers of what hands drag."""
 Key = tuple[Any, ...]
-_PAYLOADS = (TerrainScene, PointsScene, PlanScene, ReviewScene, OverlayScene)
+_PAYLOADS = (TerrainScene, PointsScene, TexturedScene, PlanScene, ReviewScene, OverlayScene)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +34,7 @@ def layers(gizmo_ready: Ready) -> tuple[Layer, ...]:
     return (
         Layer("terrain", terrain_nodes, lambda d: (d.terrain, d.frame, d.state.overlay, d.has_mesh)),
         Layer("points", points_nodes, lambda d: (d.points, d.frame)),
+        Layer("textured", textured_nodes, lambda d: (d.textured, d.frame)),
         Layer("unknown", unknown_nodes, lambda d: (d.terrain, d.frame, d.state.view.show_unknown)),
         Layer("surface", surface_nodes, lambda d: (*_plan_key(d), d.state.view.show_surface)),
         Layer("flight", flight_nodes, lambda d: (*_plan_key(d), d.state.view.show_path)),

@@ -24,10 +24,17 @@ export interface Notice {
 export const plan = signal<PlanState | null>(null);
 export const document_ = signal<PlanDoc | null>(null);
 export const saving = signal(false);
-export const library = signal<LibraryState>({ terrains: [], orthophotos: [], plans: [], profiles: [] });
+export const library = signal<LibraryState>({
+  terrains: [],
+  orthophotos: [],
+  meshes: [],
+  plans: [],
+  profiles: [],
+});
 export const view = signal<ViewDoc>({
   shading: "height",
   show_points: false,
+  show_textured: false,
   show_mesh: true,
   show_surface: true,
   show_path: true,
@@ -47,6 +54,8 @@ export const view = signal<ViewDoc>({
   legend_max_m: null,
   points_shown: 0,
   points_state: "none",
+  textured_triangles: 0,
+  textured_state: "none",
   points_of: 0,
   points_colored: false,
 });
