@@ -65,6 +65,19 @@ describe("dropped files", () => {
     expect(partsOfProjects(found).map((f) => f.name)).toEqual(["dsm.tif", "notes.csv"]);
   });
 
+  it("of a folder with a tileset, or with glTF as text, are parts of one mesh", async () => {
+    for (const name of ["tileset.json", "house.gltf"]) {
+      const mesh = folderEntry("model", "/model", [
+        fileEntry(name, `/model/${name}`),
+        fileEntry("a.glb", "/model/a.glb"),
+      ]);
+      const found = await droppedFiles(drop([mesh], [file("model")]));
+      expect(partsOfProjects(found).map((f) => f.name)).toEqual([name, "a.glb"]);
+    }
+    const alone = folderEntry("model", "/model", [fileEntry("a.glb", "/model/a.glb")]);
+    expect(partsOfProjects(await droppedFiles(drop([alone], [file("model")])))).toEqual([]);
+  });
+
   it("that lie in a folder of tiles, or alone, are no project", async () => {
     const tiles = folderEntry("odm", "/odm", [fileEntry("dsm.tif", "/odm/dsm.tif")]);
     const found = await droppedFiles(drop([tiles], [file("odm")]));

@@ -40,6 +40,15 @@ function pointsDrawn(): string | null {
   return points_state === "drawn" ? `${number(points_shown)} of ${many(points_of)} points` : null;
 }
 
+/** Whether the textured mesh is drawn; null: it is not asked for, or there is none. */
+function meshDrawn(): string | null {
+  const { show_textured, textured_triangles, textured_state } = view.value;
+  if (!show_textured || textured_triangles === 0) return null;
+  if (textured_state === "loading") return "Mesh is loading…";
+  if (textured_state === "failed") return "The mesh cannot be drawn";
+  return textured_state === "drawn" ? "Mesh: a picture, not certified" : null;
+}
+
 /** What the colours of the 3D view mean, in one line along its lower edge: of what is drawn, nothing else. */
 export function Legend() {
   const { shading, show_surface, show_path, show_unknown } = view.value;
@@ -48,14 +57,18 @@ export function Legend() {
   const flown = !isReview && trackVersion.live.value > 0 && tracks.live.s_m.length > 0;
   const hasUnknown = (terrain.value?.unknown_share ?? 0) > 0;
   const { show_points, show_mesh, show_traversability, points_colored, points_state } = view.value;
-  const points = pointsDrawn();
+  const [points, mesh] = [pointsDrawn(), meshDrawn()];
+  const { show_textured, textured_state } = view.value;
   // Colours on the ground keep the model on show.
   const isCovered = show_traversability && hasTraversability.value;
-  const inPlace = points_state === "drawn" && show_points && !show_mesh && !isCovered;
-  const byHeight = hasHeights() && (inPlace ? !points_colored : shading === "height");
+  const asPoints = points_state === "drawn" && show_points;
+  const asMesh = textured_state === "drawn" && show_textured;
+  const inPlace = (asPoints || asMesh) && !show_mesh && !isCovered;
+  const byHeight = hasHeights() && (inPlace ? asPoints && !points_colored : shading === "height");
   const isEmpty =
     !byHeight &&
     !points &&
+    !mesh &&
     !(planned && (show_surface || show_path)) &&
     !(show_unknown && hasUnknown) &&
     !flown &&
@@ -68,6 +81,16 @@ export function Legend() {
         <span class="number" data-testid="points-drawn" role="status" title="Thinned evenly for drawing">
           {points_state === "loading" && <span class="spinner" aria-hidden="true" />}
           {points}
+        </span>
+      )}
+      {mesh && (
+        <span
+          data-testid="mesh-drawn"
+          role="status"
+          title="Clearance is proved against the surface model alone; nothing is judged by the mesh"
+        >
+          {textured_state === "loading" && <span class="spinner" aria-hidden="true" />}
+          {mesh}
         </span>
       )}
       {planned && show_surface && <Key kind="surface" label="Safe surface" />}

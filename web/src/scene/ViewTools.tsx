@@ -7,11 +7,26 @@ import { follows, frame, setView } from "../store/stream";
 import { chase, followed } from "./camera";
 
 type Layer =
-  "show_points" | "show_mesh" | "show_surface" | "show_path" | "show_unknown" | "show_traversability";
+  | "show_points"
+  | "show_textured"
+  | "show_mesh"
+  | "show_surface"
+  | "show_path"
+  | "show_unknown"
+  | "show_traversability";
 
 const LAYERS: readonly { layer: Layer; label: string; title: string }[] = [
   { layer: "show_points", label: "Points", title: "The point cloud in place of the model" },
-  { layer: "show_mesh", label: "Model", title: "The model beside its points: it hides those below it" },
+  {
+    layer: "show_textured",
+    label: "Mesh",
+    title: "The textured mesh in place of the model: a picture, nothing is judged by it",
+  },
+  {
+    layer: "show_mesh",
+    label: "Model",
+    title: "The model beside its points and mesh: it hides what is below it",
+  },
   { layer: "show_surface", label: "Surface", title: "The safe surface" },
   { layer: "show_path", label: "Path", title: "The path and the mission as it will be flown" },
   { layer: "show_unknown", label: "Unknown", title: "Where the surface model knows no height" },
@@ -21,13 +36,18 @@ const LAYERS: readonly { layer: Layer; label: string; title: string }[] = [
 /** Traversability has to be worked out first, and few models come of a cloud. */
 function isThere({ layer }: { layer: Layer }): boolean {
   if (layer === "show_traversability") return hasTraversability.value;
-  return (layer !== "show_points" && layer !== "show_mesh") || view.value.points_shown > 0;
+  const [hasPoints, hasTextured] = [view.value.points_shown > 0, view.value.textured_triangles > 0];
+  if (layer === "show_points") return hasPoints;
+  if (layer === "show_textured") return hasTextured;
+  return layer !== "show_mesh" || hasPoints || hasTextured;
 }
 
 /** Why the model is drawn whatever is pressed; null: it need not be. */
 function boundBy(layer: Layer): string | null {
   if (layer !== "show_mesh") return null;
-  if (!view.value.show_points) return "Without its points the model is always drawn";
+  const { show_points, points_shown, show_textured, textured_triangles } = view.value;
+  if (!(show_points && points_shown > 0) && !(show_textured && textured_triangles > 0))
+    return "Without its points or its mesh the model is always drawn";
   return view.value.show_traversability && hasTraversability.value
     ? "The colours of the ground lie on it"
     : null;
@@ -36,7 +56,10 @@ function boundBy(layer: Layer): string | null {
 function toggle(layer: Layer): void {
   const isOn = !view.value[layer];
   const fields: Partial<ViewDoc> = { [layer]: isOn };
-  setView(layer === "show_points" ? { ...fields, show_mesh: !isOn } : fields);
+  const other = { show_points: "show_textured", show_textured: "show_points" } as const;
+  if (layer !== "show_points" && layer !== "show_textured") setView(fields);
+  // The model gives way to either, and comes back when neither is drawn.
+  else setView({ ...fields, show_mesh: !isOn && !view.value[other[layer]] });
 }
 
 /** Layers and camera of the 3D view. */

@@ -23,6 +23,7 @@ function Kinds() {
       <p class="drop-title">Drop to open</p>
       <p>Surface model: GeoTIFF, ESRI ASCII grid, .zip of tiles or of a project</p>
       <p>Point cloud: LAS, LAZ, COPC, PLY, PCD, E57</p>
+      <p>Textured mesh over its surface model: .glb, .zip of 3D Tiles</p>
       <p>Points or polygon: CSV, GeoJSON, KML, KMZ, .waypoints, .plan</p>
       <p>Recorded flight: .mcap, .tlog, .bin, .ulg; ROS bag: .bag, .db3, .mcap, .zip</p>
       <p>UWB radar log: .npz; raw radar samples: .npy, .bin</p>
@@ -66,7 +67,11 @@ export function FileDrop() {
     const all = await droppedFiles(event.dataTransfer);
     const parts = new Set(partsOfProjects(all));
     if (parts.size > 0)
-      notifyText("error", "The folder is a mapping project: nothing of it was opened.", "Drop it as a ZIP.");
+      notifyText(
+        "error",
+        "The folder is a mapping project or a mesh: nothing of it was opened.",
+        "Drop it as a ZIP.",
+      );
     const terrain = new Set(terrainModels(all.filter((file) => !parts.has(file))));
     if (terrain.size > 0) {
       const names = [...terrain].slice(0, 3).map((file) => file.name.slice(-60));

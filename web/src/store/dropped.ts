@@ -5,7 +5,7 @@ import { isTerrainModel, programOf } from "./projects";
 const folders = new WeakMap<File, string>();
 const DEEPEST = 4;
 const OPENED =
-  /\.(tiff?|asc|zip|las|laz|ply|pcd|e57|csv|geojson|json|kml|kmz|waypoints|plan|tlog|mcap|ulg|npz|npy|bin|bag|db3)$/i;
+  /\.(tiff?|asc|zip|las|laz|ply|pcd|e57|glb|gltf|csv|geojson|json|kml|kmz|waypoints|plan|tlog|mcap|ulg|npz|npy|bin|bag|db3)$/i;
 
 export const folderOf = (file: File): string => folders.get(file) ?? "";
 
@@ -18,8 +18,12 @@ export function partsOfProjects(files: readonly File[]): File[] {
     const top = folderOf(file).split("/")[0]!;
     tops.set(top, [...(tops.get(top) ?? []), file]);
   }
-  return [...tops.values()].filter((inside) => programOf(inside.map(pathOf)) !== null).flat();
+  return [...tops.values()].filter((inside) => isProject(inside)).flat();
 }
+
+/** Apart, the files of a tileset or of a mesh as text would be none. */
+const isProject = (inside: File[]) =>
+  programOf(inside.map(pathOf)) !== null || inside.some(({ name }) => /(^tileset\.json|\.gltf)$/i.test(name));
 
 /** Rasters of dropped folders that are terrain models by name: trees and buildings are missing in them. */
 export const terrainModels = (files: readonly File[]): File[] =>

@@ -44,7 +44,7 @@ export const NO_HINTS: RasterHints = {
 
 /** What is made a surface model of; told for sure by its content, on the server. */
 export const isCloud = (name: string) => /\.(las|laz|ply|pcd|e57)$/i.test(name);
-export const MODEL_FILES = ".tif,.tiff,.asc,.txt,.zip,.las,.laz,.ply,.pcd,.e57";
+export const MODEL_FILES = ".tif,.tiff,.asc,.txt,.zip,.las,.laz,.ply,.pcd,.e57,.glb,.gltf";
 
 export const sending = signal<Sending[]>([]);
 /** Files by the job that reads them: kept so that a file can be sent again with what was missing. */

@@ -13,6 +13,7 @@ export const deletePlan = (id: string) => act("DELETE", `/api/plans/${id}`, "pla
 export const shortestOrder = () => command("/api/plan/shortest_order", "points");
 export const useDemo = () => act("POST", "/api/terrains/demo", "terrain");
 export const deleteTerrain = (id: string) => act("DELETE", `/api/terrains/${id}`, "terrain");
+export const deleteMesh = (id: string) => act("DELETE", `/api/meshes/${id}`, "terrain");
 export const removeSpikes = (id: string) => act("POST", `/api/terrains/${id}/remove_spikes`, "terrain");
 
 export function removeSelectedPoi(id: string | null): void {

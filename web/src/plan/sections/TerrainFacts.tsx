@@ -1,9 +1,10 @@
 import { useState } from "preact/hooks";
 import { forConsole, metres, number, percent } from "../../format";
-import type { CloudDoc, TerrainDoc } from "../../messages";
+import type { CloudDoc, MeshDoc, TerrainDoc } from "../../messages";
 import { Button } from "../../ui/Button";
 import { Icon } from "../../ui/Icon";
-import { removeSpikes } from "../../store/plans";
+import { deleteMesh, removeSpikes } from "../../store/plans";
+import { library } from "../../store/state";
 import { ReadAgain } from "./RasterHints";
 
 function Spikes({ entry }: { entry: TerrainDoc }) {
@@ -83,9 +84,37 @@ function CloudFacts({ cloud, cell_m }: { cloud: CloudDoc; cell_m: number }) {
   );
 }
 
+/** The textured mesh that is drawn in the model's place, and what was done to lay it there. */
+function MeshFacts({ mesh }: { mesh: MeshDoc }) {
+  return (
+    <dl class="facts-list" data-testid="mesh-facts">
+      <dt>Mesh</dt>
+      <dd>
+        {mesh.name}, {number(mesh.triangles)} triangles: a picture. Clearance is proved against the surface
+        model alone.{" "}
+        <Button
+          kind="quiet"
+          class="small"
+          icon="trash"
+          testid="mesh-delete"
+          title={`Delete ${mesh.name}; the surface model stays`}
+          onClick={() => void deleteMesh(mesh.id)}
+        />
+      </dd>
+      {mesh.notes.length > 0 && (
+        <>
+          <dt>Of the mesh</dt>
+          <dd>{mesh.notes.map(forConsole).join(" ")}</dd>
+        </>
+      )}
+    </dl>
+  );
+}
+
 /** What a surface model is, and what is doubtful about it. */
 export function TerrainFacts({ entry }: { entry: TerrainDoc }) {
   const [rereadId, setRereadId] = useState<string | null>(null);
+  const mesh = library.value.meshes.filter((each) => each.terrain_id === entry.id).at(-1);
   const isOfCloud = entry.cloud?.made_model === true;
   const [width_m, height_m] = [entry.width_px * entry.resolution_m, entry.height_px * entry.resolution_m];
   return (
@@ -113,6 +142,7 @@ export function TerrainFacts({ entry }: { entry: TerrainDoc }) {
           <dt>Resolution</dt>
           <dd>{metres(entry.resolution_m, 3)} per cell</dd>
         </dl>
+        {mesh && <MeshFacts mesh={mesh} />}
         {entry.cloud && <CloudFacts cloud={entry.cloud} cell_m={entry.resolution_m} />}
       </details>
       <Spikes entry={entry} />
