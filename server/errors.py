@@ -85,6 +85,10 @@ class ObserverError(ForbiddenError):
     code = "observer"
 
 
+class OtherStationError(ForbiddenError):
+    code = "other_station"
+
+
 class NotFoundError(ServerError):
     code = "not_found"
 

@@ -7,8 +7,8 @@ import sys
 from collections.abc import Coroutine, Sequence
 from typing import Any
 
+from server.door.alarms import Alarms
 from server.door.hub import Hub
-from server.door.station_files import station_of
 from server.errors import BadRequestError, NotFoundError
 from server.flying.apart.airspace import Airspace
 from server.flying.apart.nearness import Nearness
@@ -95,9 +95,8 @@ class Fleet:
     ) -> Fleet:
         """Joins the buses; nodes that a server before this one has left running are taken over.
 
-        Raises BusError, StartError.
+        Raises BusError.
         """
-        meeting = await asyncio.to_thread(_meeting, settings)
         present = Present(hub)
         shelf = await asyncio.to_thread(RecordingShelf, library)
         checklists = await asyncio.to_thread(Checklists, library.root)
@@ -109,7 +108,7 @@ class Fleet:
         except BaseException:
             await asyncio.gather(*(flying.close() for flying in flights))
             raise
-        return cls(flights, present, shared, meeting)
+        return cls(flights, present, shared, _meeting(settings))
 
     # The vehicles
 
@@ -124,13 +123,18 @@ class Fleet:
     def of(self, number: int) -> Flying:
         """Raises NotFoundError."""
         if number not in self._flights:
-            raise NotFoundError(
-                f"There is no vehicle {number}.", advice=f"There are {', '.join(map(str, self._flights))}."
-            )
+            advice = f"There are {', '.join(map(str, self._flights))}."
+            elsewhere = "" if self._stations is None else self._stations.elsewhere(number)
+            raise NotFoundError(f"There is no vehicle {number}.", advice=f"{advice} {elsewhere}".strip())
         return self._flights[number]
 
     def named(self, number: str | None) -> Flying:
-        """By what a request says. Where there are several it must say it. Raises BadRequestError, NotFoundError."""
+        """By what a request says. Where there are several it must say it.
+
+        Raises BadRequestError, NotFoundError; OtherStationError, where it names another station's.
+        """
+        if number is not None and self._stations is not None:
+            number = self._stations.who_commands(number) or number
         if number is None and len(self._flights) == 1:
             return self.first
         if number is None:
@@ -153,14 +157,14 @@ class Fleet:
 
     # Life
 
-    def loops(self, *, demo: bool = False) -> list[Coroutine[Any, Any, None]]:
+    def loops(self, alarms: Alarms, *, demo: bool = False) -> list[Coroutine[Any, Any, None]]:
         """To be run by the application's task group until it ends."""
         return [
             *(loop for flying in self.flights for loop in flying.loops(demo=demo)),
             *self._relay().loops(),
             self._hear_of_plan(),
             *([self._tell(), self._nearness.run(), self._others.run()] if self._has_others else []),
-            *([self.first.nodes.no_stations()] if self._stations is None else self._stations.loops()),
+            *([self.first.nodes.no_stations()] if self._stations is None else self._stations.loops(alarms)),
             self.recordings.run(),
             self._scenery.run(),
             self._airspace.run(),
@@ -211,7 +215,10 @@ class Fleet:
 
     def _own(self) -> list[FleetVehicle]:
         near = self._nearness.alarms
-        return [fleet_vehicle(f.doc(near.get(f.number)), f.live, f.connections.status) for f in self.flights]
+        return [
+            fleet_vehicle(f.doc(near.get(f.number)), f.live, f.connections.status, in_charge_silent=f.lease.is_silent)
+            for f in self.flights
+        ]
 
     @property
     def _message(self) -> FleetMessage:
@@ -225,9 +232,8 @@ class Fleet:
 
 
 def _meeting(settings: Settings) -> Meeting | None:
-    """Raises StartError."""
     file = settings.stations_file
-    return None if file is None else Meeting(station_of(file), settings.stations_router, file)
+    return None if file is None else Meeting(settings.stations_router, file)
 
 
 def _wanted(settings: Settings, library: Library, demo: bool) -> list[VehicleWanted]:

@@ -159,7 +159,7 @@ async def _lifespan(
             parts.audit.run(),
             *_tls_loops(tls, settings, parts.alarms),
         )
-        for loop in (*own, *parts.workspace.loops(), *parts.fleet.loops(demo=demo)):
+        for loop in (*own, *parts.workspace.loops(), *parts.fleet.loops(parts.alarms, demo=demo)):
             background.spawn(loop)
         try:
             yield

@@ -107,6 +107,25 @@ def test_the_console_is_published_on_loopback_only(compose: str) -> None:
     assert ports == ["127.0.0.1:8000:8000/tcp", "${HEDGEHOP_MAVLINK_ADDRESS:-127.0.0.1}:14550:14550/udp"]
 
 
+def test_the_router_is_of_the_version_that_stations_speak_and_has_no_rights() -> None:
+    """Its image's entry point parts arguments at spaces: none may hold one."""
+    text = (DOCKER / "compose.fleet.yaml").read_text(encoding="utf-8")
+    used = "\n".join(line for line in text.splitlines() if not line.lstrip().startswith("#"))
+    locked = re.search(r"^eclipse-zenoh==(\S+)", (ROOT / "requirements.txt").read_text(encoding="utf-8"), re.MULTILINE)
+    assert locked
+    assert f"HEDGEHOP_ROUTER_IMAGE:-eclipse/zenoh:{locked[1]}}}" in used
+    assert 'command: ["--config", "/router.json5"]' in used
+    assert section(used, "ports").split() == ["-", '"${HEDGEHOP_ROUTER_ADDRESS:-0.0.0.0}:7447:7447/tcp"']
+    assert section(used, "cap_drop").split() == ["-", "ALL"]
+    assert "target: /router.json5\n        read_only: true" in used
+    assert "create_host_path: false" in used
+    # What a station in a container is given: settings that exist.
+    documented = (ROOT / "docs" / "settings.md").read_text(encoding="utf-8")
+    given = re.findall(r"^#\s+(HEDGEHOP_STATIONS_[A-Z_]+):", text, re.MULTILINE)
+    assert given == ["HEDGEHOP_STATIONS_ROUTER", "HEDGEHOP_STATIONS_FILE"]
+    assert all(f"`{name}`" in documented for name in given)
+
+
 def test_the_container_may_do_nothing_it_does_not_need(compose: str) -> None:
     assert "read_only: true" in compose
     assert section(compose, "cap_drop").split() == ["-", "ALL"]

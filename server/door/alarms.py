@@ -7,7 +7,7 @@ from typing import Literal
 
 from server.schemas import AlarmDoc, AlarmsMessage, ErrorDoc, Pages
 
-Kind = Literal["disk", "audit", "certificate", "restart"]
+Kind = Literal["disk", "audit", "certificate", "restart", "stations"]
 
 
 class Alarms:

@@ -87,7 +87,7 @@ def station_of(path: Path) -> str:
         if len(_parts(path.read_text(encoding="ascii"))) != 3:
             raise StationsError("It must hold a key, the station's certificate and the authority's.")
         return checked_name(read_common_name(path))
-    except (OSError, UnicodeDecodeError, DescribedError) as error:
+    except (OSError, ValueError, DescribedError) as error:
         why = error.what if isinstance(error, DescribedError) else str(error)
         raise StartError(
             f"The station's file cannot be used: {why}",

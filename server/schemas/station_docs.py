@@ -47,7 +47,7 @@ class VehicleDoc(Strict):
 class AlarmDoc(Strict):
     """Stands on every page until it is over, or until somebody has read it."""
 
-    kind: Literal["disk", "audit", "certificate", "restart"]
+    kind: Literal["disk", "audit", "certificate", "restart", "stations"]
     level: Literal["warning", "error"]
     began_utc_s: float
     error: ErrorDoc
@@ -112,11 +112,19 @@ class OtherVehicleDoc(Strict):
     alt_amsl_m: float | None = None
     alt_surface_m: float | None = None
     ground_speed_m_s: float | None = None
+    in_charge: str = ""
+    """Who commands it at its own station; empty: nobody."""
+    in_charge_silent: bool = False
+    """Nothing is heard of them there."""
     mode: str = ""
+    phase: str = "idle"
+    """As in the flight message."""
     armed: bool = False
     in_air: bool = False
     link: Literal["none", "live", "stale", "lost"] = "none"
+    battery_share: float | None = None
     battery: str = ""
+    """In words, with the time that is left."""
     plan: str = ""
     plan_share: float | None = None
     text: str = ""

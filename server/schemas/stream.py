@@ -91,6 +91,10 @@ class StationsMessage(Message):
     """Other stations and their vehicles, twice a second, where this station meets them at a router."""
 
     type: Literal["stations"] = "stations"
+    now_mono_s: float
+    """The server's clock, from which the ages in it count."""
+    old_s: float
+    """A position that is older is shown as old."""
     station: str
     """This one's name."""
     router: Literal["connected", "lost"]

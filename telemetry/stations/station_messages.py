@@ -18,7 +18,10 @@ from telemetry.topics.station_vehicles import FleetVehicle, VehicleLink
 VEHICLE_BYTES, BEACON_BYTES = 500, 4096
 """Longer ones are refused unread: two of a vehicle in a second, with all that TLS and TCP add, stay under 2 kB."""
 NAME_BYTES, MODE_BYTES, BATTERY_BYTES, PLAN_BYTES, ALARM_BYTES = 40, 20, 48, 48, 150
+IN_CHARGE_BYTES = 40
 _LINKS: tuple[VehicleLink, ...] = ("none", "live", "stale", "lost")
+_PHASES = "idle", "arming", "taking_off", "flying", "paused", "returning", "landed", "interrupted"
+"""Of a flight; on the wire each is its place here."""
 _OFF_MS = 10**8
 """A day and more: an age beyond it is told as this."""
 
@@ -43,8 +46,9 @@ class VehicleWire(msgspec.Struct, array_like=True, frozen=True, forbid_unknown_f
     """Of the position, when this was sent."""
     name: Words
     mode: Words
-    flags: Annotated[int, Meta(ge=0, lt=16)]
-    """1 armed, 2 in the air, and 4 times the link's state"""
+    phase: Annotated[int, Meta(ge=0, lt=len(_PHASES))]
+    flags: Annotated[int, Meta(ge=0, lt=32)]
+    """1 armed, 2 in the air, 4 times the link's state, 16 nothing is heard of who is in charge"""
     link_quality: Permille
     lat_e7: Annotated[int, Meta(ge=-900_000_000, le=900_000_000)] | None
     lon_e7: Annotated[int, Meta(ge=-1_800_000_000, le=1_800_000_000)] | None
@@ -59,6 +63,7 @@ class VehicleWire(msgspec.Struct, array_like=True, frozen=True, forbid_unknown_f
     plan: Words
     plan_share: Permille
     alarm: Words
+    in_charge: Words
 
 
 class HeardWire(msgspec.Struct, array_like=True, frozen=True, forbid_unknown_fields=True):
@@ -96,7 +101,8 @@ def vehicle_wire(of: FleetVehicle, *, run: int, count: int, now_mono_s: float) -
         age_ms=None if age_s is None else min(round(age_s * 1000), _OFF_MS),
         name=cleaned(of.name, NAME_BYTES),
         mode=cleaned(of.mode, MODE_BYTES),
-        flags=of.armed + 2 * of.in_air + 4 * _LINKS.index(of.link),
+        phase=_PHASES.index(of.phase) if of.phase in _PHASES else 0,
+        flags=of.armed + 2 * of.in_air + 4 * _LINKS.index(of.link) + 16 * of.in_charge_silent,
         link_quality=_share(of.link_quality),
         lat_e7=_scaled(of.lat_deg, 1e7, 900_000_000) if placed else None,
         lon_e7=_scaled(of.lon_deg, 1e7, 1_800_000_000) if placed else None,
@@ -111,6 +117,7 @@ def vehicle_wire(of: FleetVehicle, *, run: int, count: int, now_mono_s: float) -
         plan=cleaned(of.plan, PLAN_BYTES),
         plan_share=_share(of.plan_share),
         alarm=cleaned(of.alarm, ALARM_BYTES),
+        in_charge=cleaned(of.in_charge, IN_CHARGE_BYTES),
     )
 
 
@@ -122,7 +129,10 @@ def vehicle_of(wire: VehicleWire, number: int, position_t_mono_s: float | None) 
         mode=cleaned(wire.mode, MODE_BYTES),
         armed=bool(wire.flags & 1),
         in_air=bool(wire.flags & 2),
-        link=_LINKS[wire.flags >> 2],
+        phase=_PHASES[wire.phase],
+        link=_LINKS[wire.flags >> 2 & 3],
+        in_charge=cleaned(wire.in_charge, IN_CHARGE_BYTES),
+        in_charge_silent=bool(wire.flags & 16),
         link_quality=_of(wire.link_quality, 1000),
         position_t_mono_s=position_t_mono_s if placed else None,
         lat_deg=_of(wire.lat_e7, 1e7) if placed else None,

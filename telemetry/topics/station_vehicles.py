@@ -18,7 +18,13 @@ class FleetVehicle:
     number: int
     """At its own station."""
     name: str
+    in_charge: str = ""
+    """Who commands it at its own station; empty: nobody."""
+    in_charge_silent: bool = False
+    """Nothing is heard of them there."""
     mode: str = ""
+    phase: str = "idle"
+    """Of its flight, as ``telemetry.topics.messages.FlightPhase`` names them."""
     armed: bool = False
     in_air: bool = False
     link: VehicleLink = "none"

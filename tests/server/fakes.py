@@ -246,7 +246,7 @@ class FakeFleet:
         holder = self.first.lease.holder
         return set() if holder is None else {holder.session_key}
 
-    def loops(self, *, demo: bool = False) -> list:
+    def loops(self, alarms: object, *, demo: bool = False) -> list:
         return []
 
     async def close(self) -> None:

@@ -80,7 +80,7 @@ class Desk:
         self.now_s, self.published = NOW_S, list[StationsMessage]()
         hub: Any = SimpleNamespace(publish=self.published.append)
         none: Any = None
-        meeting = Meeting("Alpha", ("tls/router:7447",), Path("Alpha.pem"))
+        meeting = Meeting(("tls/router:7447",), Path("Alpha.pem"))
         self.it = OtherStations(meeting, none, none, hub, lambda: [], now_mono_s=lambda: self.now_s)
         self.tell(*vehicles, **more)
 
@@ -357,7 +357,13 @@ def test_the_row_of_the_check_holds_what_both_say() -> None:
 
 def test_own_vehicles_are_told_as_they_are_known() -> None:
     doc = VehicleDoc(
-        number=2, name="Bee", link="live", plan_name="Ridge", alarm=VehicleAlarm(kind="loss", key="", text="Lost.")
+        number=2,
+        name="Bee",
+        holder="Anna",
+        phase="flying",
+        link="live",
+        plan_name="Ridge",
+        alarm=VehicleAlarm(kind="loss", key="", text="Lost."),
     )
     state = VehicleState(
         1, 1, mode="AUTO", armed=True, position_t_mono_s=9.0, lat_deg=47.0, lon_deg=8.0, alt_rel_home_m=30.0,
@@ -365,7 +371,8 @@ def test_own_vehicles_are_told_as_they_are_known() -> None:
     )  # fmt: skip
     follow = SimpleNamespace(progress=0.4, height_above_dsm_m=12.0)
     channel: Any = SimpleNamespace(state=state, follow=follow, in_air=True, battery="63 %")
-    told = fleet_vehicle(doc, channel, LinkStatus(0.0, quality=0.9))
+    told = fleet_vehicle(doc, channel, LinkStatus(0.0, quality=0.9), in_charge_silent=True)
+    assert (told.in_charge, told.in_charge_silent, told.phase) == ("Anna", True, "flying")
     assert (told.plan, told.plan_share, told.alt_surface_m, told.battery) == ("Ridge", 0.4, 12.0, "63 %")
     assert told.v_enu_m_s == (4.0, 3.0, 1.0)
     assert (told.link_quality, told.alarm, told.position_t_mono_s) == (0.9, "Lost.", 9.0)
@@ -373,4 +380,5 @@ def test_own_vehicles_are_told_as_they_are_known() -> None:
     told = fleet_vehicle(doc, channel, None)
     assert (told.plan, told.plan_share, told.v_enu_m_s) == ("", None, None)
     channel.state = None
-    assert fleet_vehicle(doc, channel, None).lat_deg is None
+    told = fleet_vehicle(doc.model_copy(update={"holder": None}), channel, None)
+    assert (told.lat_deg, told.in_charge) == (None, "")

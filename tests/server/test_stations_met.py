@@ -8,9 +8,6 @@ from typing import Any
 
 import pytest
 
-from server.errors import StartError
-from server.fleet import Fleet
-from server.settings import Settings
 from tests.server.station import Station, station
 from tests.telemetry.bus_runs import run, short_folder
 from tests.telemetry.station_fleet import Field, FieldStation
@@ -49,6 +46,16 @@ def _look(folder: Path, field: Field, bravo: FieldStation, loop: asyncio.Abstrac
         assert (seen.station, seen.refused) == ("Alpha", 0)
         assert [vehicle.name for vehicle in seen.stations[0].vehicles] == ["Drone 1", "Drone 2"]
         assert all(vehicle.in_air and not vehicle.text for vehicle in seen.stations[0].vehicles)
+        # Who commands it there is told, and a command for it from here is refused with that.
+        assert {vehicle.in_charge for vehicle in seen.stations[0].vehicles} == {"Anna"}
+        for path in ("/api/lease/take", "/api/flight/arm", "/api/flight/land"):
+            refused = alpha.http.post(path, headers={"Hedgehop-Vehicle": "Bravo/2"})
+            assert (refused.status_code, refused.json()["code"]) == (403, "other_station")
+            assert refused.json()["what"].startswith("Drone 2 (Bravo 2) is commanded by Bravo alone")
+            assert refused.json()["advice"] == "Anna is in charge of it there. Call Bravo."
+        elsewhere = alpha.http.post("/api/lease/take", headers={"Hedgehop-Vehicle": "2"})
+        assert (elsewhere.status_code, "Bravo/2 is another station's" in elsewhere.json()["advice"]) == (404, True)
+        assert alpha.http.post("/api/lease/take", headers={"Hedgehop-Vehicle": "Alpha/1"}).is_success
         # And the other way round: a vehicle that is not connected is told as such.
         told = bravo.until(lambda status: any(other.station == "Alpha" for other in status.vehicles))
         (own,) = asyncio.run_coroutine_threadsafe(told, loop).result().vehicles
@@ -65,17 +72,38 @@ def _look(folder: Path, field: Field, bravo: FieldStation, loop: asyncio.Abstrac
         assert alpha.until(lambda message: message.type == "fleet").vehicles[0].number == 1
 
 
+@pytest.mark.xdist_group("real-time")
+@pytest.mark.slow
+def test_without_its_file_a_station_starts_says_so_and_meets_others_once_it_is_there() -> None:
+    async def whole(folder: Path) -> None:
+        field = Field(folder, ("Alpha", "Bravo"))
+        await field.router.start()
+        try:
+            async with field.station("Bravo"):
+                await asyncio.to_thread(_without_file, folder, field)
+        finally:
+            field.router.kill()
+
+    with short_folder() as folder:
+        run(lambda: whole(folder))
+
+
+def _without_file(folder: Path, field: Field) -> None:
+    file = folder / "Alpha.pem"
+    settings: dict[str, Any] = {"stations_router": (f"127.0.0.1:{field.port}",), "stations_file": file}
+    with station(folder / "alpha", flies=True, **settings) as alpha:
+        told = _stations(alpha, lambda told: "cannot be used" in told.text)
+        assert (told.station, told.router, told.stations) == ("", "lost", [])
+        with alpha.server.socket() as socket:
+            (alarm,) = Station(alpha.server, socket).until(lambda message: message.type == "alarms").alarms
+        assert (alarm.kind, alarm.level, str(file) in alarm.error.where) == ("stations", "error", True)
+        assert "Own vehicles are not affected" in alarm.error.what
+        # Its own vehicle is there as ever.
+        assert alpha.http.post("/api/lease/take").is_success
+        file.write_bytes((field.files / "Alpha.pem").read_bytes())
+        alpha.until(lambda message: message.type == "alarms" and not message.alarms)
+        assert _stations(alpha, lambda told: bool(told.stations) and not told.text).station == "Alpha"
+
+
 def _stations(page: Station, holds: Any) -> Any:
     return page.until(lambda message: message.type == "stations" and holds(message))
-
-
-def test_a_station_whose_file_is_none_does_not_start(tmp_path: Path) -> None:
-    (tmp_path / "odd.pem").write_text("nothing")
-    settings: dict[str, Any] = {"stations_router": ("router.example",), "stations_file": tmp_path / "odd.pem"}
-    with pytest.raises(StartError, match="station's file cannot be used"):
-        asyncio.run(_opened(tmp_path, settings))
-
-
-async def _opened(tmp_path: Path, settings: dict[str, Any]) -> None:
-    none: Any = None
-    await Fleet.open(Settings(data_dir=tmp_path, **settings), none, none, none, none, False)

@@ -35,7 +35,9 @@ def own_vehicles(count: int) -> OwnVehicles:
         FleetVehicle(
             number=number,
             name=f"Drone {number}",
+            in_charge="Anna",
             mode="AUTO",
+            phase="flying",
             armed=True,
             in_air=True,
             link="live",

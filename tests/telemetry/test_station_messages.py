@@ -30,7 +30,10 @@ from telemetry.topics.station_vehicles import FleetVehicle
 BEE = FleetVehicle(
     number=3,
     name="Bee",
+    in_charge="Anna",
+    in_charge_silent=True,
     mode="AUTO",
+    phase="paused",
     armed=True,
     in_air=True,
     link="stale",
@@ -63,7 +66,8 @@ def test_what_is_told_is_what_is_heard() -> None:
     assert msgspec.structs.astuple(vehicle_wire(heard, run=7, count=1, now_mono_s=100.0)) == msgspec.structs.astuple(
         wire
     )
-    for name in ("number", "name", "mode", "armed", "in_air", "link", "lat_deg", "lon_deg", "v_enu_m_s", "battery"):
+    told = "number name in_charge in_charge_silent mode phase armed in_air link lat_deg lon_deg v_enu_m_s battery"
+    for name in told.split():
         assert getattr(heard, name) == pytest.approx(getattr(BEE, name)), name
 
 
@@ -74,7 +78,10 @@ def test_nothing_that_a_vehicle_tells_breaks_its_message(
     odd = FleetVehicle(
         number=1,
         name=name,
+        in_charge=alarm,
+        in_charge_silent=True,
         mode=mode,
+        phase=mode,
         link="lost",
         link_quality=share,
         position_t_mono_s=1.0,
@@ -94,7 +101,7 @@ def test_nothing_that_a_vehicle_tells_breaks_its_message(
     assert len(payload) <= VEHICLE_BYTES
     heard = vehicle_of(decode(payload, VehicleWire, VEHICLE_BYTES), 1, 1.0)
     assert heard.name
-    assert all(c.isprintable() for c in heard.name + heard.mode + heard.alarm)
+    assert all(c.isprintable() for c in heard.name + heard.mode + heard.alarm + heard.in_charge)
     assert heard.lat_deg is None or -90.0 <= heard.lat_deg <= 90.0
 
 
@@ -110,7 +117,9 @@ def test_noise_is_refused_and_nothing_else_happens(payload: bytes) -> None:
     [
         ("lat_e7", 900_000_001),
         ("lat_e7", 1.5),
-        ("flags", 16),
+        ("flags", 32),
+        ("phase", 8),
+        ("in_charge", "x" * 201),
         ("age_ms", -1),
         ("count", -1),
         ("run", 2**32),

@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import base64
 import json
+import queue
 import signal
-from contextlib import AsyncExitStack
+import time
+from contextlib import AsyncExitStack, suppress
 from pathlib import Path
 
 import pytest
@@ -101,6 +103,64 @@ def test_the_router_lets_nobody_speak_under_anothers_name() -> None:
             _ages_are_true(await alpha.sees("Charlie"))
 
     _in_folder(whole)
+
+
+def test_no_command_and_no_question_gets_through_the_router_whoever_asks() -> None:
+    """With a whole certificate, by hand: what another station's bus, or this one, would take for a request."""
+
+    async def whole(folder: Path) -> None:
+        field = Field(folder, NAMES)
+        async with AsyncExitStack() as stack:
+            stack.callback(field.router.kill)
+            await field.router.start()
+            heard, asked = await asyncio.to_thread(_ask_for_everything, field)
+            assert heard == {"hedgehop/stations/1/Charlie/beacon"}
+            assert asked == []
+
+    _in_folder(whole)
+
+
+_COMMANDS = (
+    "hedgehop/stations/1/Bravo/order/1",
+    "hedgehop/stations/1/Alpha/vehicle/1",
+    "hedgehop/stations/2/Charlie/order",
+    "hedgehop/stations/1",
+    "hedgehop/link/arm",
+    "link/request",
+    "vehicle/state",
+    "@/router/config",
+)
+
+
+def _said(sample: zenoh.Sample) -> str:
+    return str(sample.key_expr) if sample.kind == zenoh.SampleKind.PUT else f"deleted: {sample.key_expr}"
+
+
+def _ask_for_everything(field: Field) -> tuple[set[str], list[str]]:
+    """Keys of what Bravo hears of Charlie, and what it is asked, once what Charlie may say has come for the third time:
+    of one session nothing overtakes."""
+    came: queue.SimpleQueue[str] = queue.SimpleQueue()
+    asked, heard = list[str](), list[str]()
+    may = "hedgehop/stations/1/Charlie/beacon"
+    with _session(field, "Bravo") as bravo, _session(field, "Charlie") as charlie:
+        for keys in ("hedgehop/stations/1/**", "**", "vehicle/**", "link/**"):
+            bravo.declare_subscriber(keys, lambda sample: came.put(_said(sample)))
+            bravo.declare_queryable(keys, lambda query: asked.append(str(query.key_expr)))
+        bravo.liveliness().declare_subscriber("**", lambda sample: came.put(f"alive: {sample.key_expr}"))
+        end_s = time.monotonic() + PATIENCE_S
+        while heard.count(may) < 3:
+            assert time.monotonic() < end_s, heard
+            for key in _COMMANDS:
+                charlie.put(key, b"land")
+                charlie.delete(key)
+                assert [reply for reply in charlie.get(key, timeout=0.2) if reply.ok is not None] == []
+            charlie.delete(may)
+            charlie.liveliness().declare_token("hedgehop/stations/1/Charlie/alive")
+            charlie.put(may, b"whatever")
+            with suppress(queue.Empty):
+                while True:
+                    heard.append(came.get(timeout=0.5))
+    return set(heard), asked
 
 
 def test_without_a_certificate_of_the_authority_nobody_comes_in() -> None:

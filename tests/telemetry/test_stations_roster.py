@@ -185,7 +185,7 @@ def test_of_a_thousand_mutated_messages_none_is_taken_for_more_than_its_own_stat
         for other in told[1]:
             assert other.it.lat_deg is None or -90.0 <= other.it.lat_deg <= 90.0
             assert other.oldest_t_mono_s is None or other.oldest_t_mono_s <= 104.0
-            assert (other.it.name + other.it.mode + other.it.alarm).isprintable()
+            assert (other.it.name + other.it.mode + other.it.alarm + other.it.in_charge).isprintable()
     assert here.refused > 500
 
 

@@ -1435,7 +1435,7 @@ export interface VehicleDoc {
 
 /** Stands on every page until it is over, or until somebody has read it. */
 export interface AlarmDoc {
-  kind: "disk" | "audit" | "certificate" | "restart";
+  kind: "disk" | "audit" | "certificate" | "restart" | "stations";
   level: "warning" | "error";
   began_utc_s: number;
   error: ErrorDoc;
@@ -1495,10 +1495,18 @@ export interface OtherVehicleDoc {
   alt_amsl_m: number | null;
   alt_surface_m: number | null;
   ground_speed_m_s: number | null;
+  /** Who commands it at its own station; empty: nobody. */
+  in_charge: string;
+  /** Nothing is heard of them there. */
+  in_charge_silent: boolean;
   mode: string;
+  /** As in the flight message. */
+  phase: string;
   armed: boolean;
   in_air: boolean;
   link: "none" | "live" | "stale" | "lost";
+  battery_share: number | null;
+  /** In words, with the time that is left. */
   battery: string;
   plan: string;
   plan_share: number | null;
@@ -2723,6 +2731,10 @@ export interface FleetMessage {
 export interface StationsMessage {
   v: 1;
   type: "stations";
+  /** The server's clock, from which the ages in it count. */
+  now_mono_s: number;
+  /** A position that is older is shown as old. */
+  old_s: number;
   /** This one's name. */
   station: string;
   router: "connected" | "lost";

@@ -1,7 +1,9 @@
 import { beforeEach, describe, expect, test } from "vitest";
 import type { OtherVehicleDoc, StationsMessage } from "../src/messages";
 import { receive } from "../src/store/reduce";
-import { forgetStations, stations, words, wrong } from "../src/store/stations";
+import { now_ms } from "../src/store/clock";
+import { forgetClock, takeClock } from "../src/store/server_clock";
+import { forgetStations, isOld, stations, takeStations, words, wrong } from "../src/store/stations";
 
 const bee: OtherVehicleDoc = {
   number: 1,
@@ -14,11 +16,15 @@ const bee: OtherVehicleDoc = {
   alt_amsl_m: 530,
   alt_surface_m: 12.4,
   ground_speed_m_s: 5.25,
+  in_charge: "Anna",
+  in_charge_silent: false,
   mode: "AUTO",
+  phase: "flying",
   armed: true,
   in_air: true,
   link: "live",
-  battery: "63 %",
+  battery_share: 0.634,
+  battery: "63 %, 12 min to the reserve",
   plan: "Ridge",
   plan_share: 0.5,
   text: "",
@@ -27,6 +33,8 @@ const bee: OtherVehicleDoc = {
 const told = (vehicles: OtherVehicleDoc[], more: Partial<StationsMessage> = {}): StationsMessage => ({
   v: 1,
   type: "stations",
+  now_mono_s: 500,
+  old_s: 3,
   station: "Alpha",
   router: "connected",
   text: "",
@@ -37,11 +45,16 @@ const told = (vehicles: OtherVehicleDoc[], more: Partial<StationsMessage> = {}):
   ...more,
 });
 
-beforeEach(forgetStations);
+beforeEach(() => {
+  forgetStations();
+  forgetClock();
+});
 
 describe("other stations' vehicles", () => {
   test("age and height come first, each with its unit and from where it counts", () => {
-    expect(words(bee)).toBe("0.4\u00a0s old · 12\u00a0m above ground · 5.3\u00a0m/s · AUTO · armed");
+    expect(words(bee)).toBe(
+      "0.4\u00a0s old · 12\u00a0m above ground · 5.3\u00a0m/s · AUTO · armed · flies its plan · 63 % · Anna is in charge",
+    );
     expect(words({ ...bee, alt_surface_m: null })).toContain("30\u00a0m above its home");
     expect(words({ ...bee, alt_surface_m: null, alt_rel_home_m: null })).toContain("530\u00a0m AMSL");
     expect(words({ ...bee, alt_surface_m: null, alt_rel_home_m: null, alt_amsl_m: null })).toContain(
@@ -53,6 +66,27 @@ describe("other stations' vehicles", () => {
     expect(words({ ...bee, age_s: null })).toContain("age ?");
     expect(words({ ...bee, age_s: null, lat_deg: null })).toContain("no position");
     expect(words({ ...bee, age_s: 31.6 })).toContain("32\u00a0s old");
+  });
+
+  test("who is in charge is told as its own station tells it", () => {
+    expect(words({ ...bee, in_charge: "" })).toContain("nobody is in charge");
+    expect(words({ ...bee, in_charge_silent: true })).toContain("Anna is in charge, not heard there");
+    expect(words({ ...bee, phase: "idle", battery_share: null })).toContain("armed · Anna");
+  });
+
+  test("ages go on while nothing comes, and count what waited on a slow line", () => {
+    now_ms.value = 10_000;
+    takeStations(told([bee]), 10_000);
+    expect([words(bee).slice(0, 3), isOld(bee)]).toEqual(["0.4", false]);
+    now_ms.value = 12_000;
+    expect([words(bee).slice(0, 3), isOld(bee)]).toEqual(["2.4", false]);
+    now_ms.value = 13_000;
+    expect([words(bee).slice(0, 3), isOld(bee)]).toEqual(["3.4", true]);
+    // Just come, and told 4 s ago by the server's clock, which is known to 0.1 s.
+    takeClock({ v: 1, type: "clock", page_ms: 12_800, now_mono_s: 504 }, 13_000);
+    takeStations(told([bee]), 13_000);
+    expect([words(bee).slice(0, 3), isOld(bee)]).toEqual(["4.6", true]);
+    expect(words({ ...bee, age_s: null })).toContain("age ?");
   });
 
   test("what is wrong is told, the way to all of them first", () => {

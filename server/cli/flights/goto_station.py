@@ -22,7 +22,7 @@ WATCH = "The station flies it: watch it in the console, where Hold stands."
 
 
 def goto_by_station(
-    data_dir: Path | None, vehicle: int | None, body: WayBody, *, may_fly: bool, accepts: bool, as_json: bool
+    data_dir: Path | None, vehicle: str | None, body: WayBody, *, may_fly: bool, accepts: bool, as_json: bool
 ) -> int:
     """The command's exit code. Raises BadRequestError where no station runs, StationError."""
     with station_session(data_dir, vehicle) as station:

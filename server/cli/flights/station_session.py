@@ -37,7 +37,7 @@ NOT_IN_CHARGE = "Nothing was asked of the vehicle."
 class StationSession:
     """Requests are made one at a time, and block."""
 
-    def __init__(self, origin: str, tls: ssl.SSLContext | None, vehicle: int | None = None) -> None:
+    def __init__(self, origin: str, tls: ssl.SSLContext | None, vehicle: str | None = None) -> None:
         """``vehicle``: number of the one that requests are about; None: the station has only one."""
         self._origin, self._tls, self._vehicle = origin, tls, vehicle
         self._cookie = ""
@@ -108,7 +108,7 @@ class StationSession:
         if self._cookie:
             headers["Cookie"] = self._cookie
         if self._vehicle is not None:
-            headers["Hedgehop-Vehicle"] = str(self._vehicle)
+            headers["Hedgehop-Vehicle"] = self._vehicle
         sent = None if body is None else json.dumps(body).encode()
         if sent is not None:
             headers["Content-Type"] = "application/json"
@@ -129,7 +129,7 @@ class StationSession:
 
 
 @contextmanager
-def station_session(data_dir: Path | None, vehicle: int | None) -> Iterator[StationSession]:
+def station_session(data_dir: Path | None, vehicle: str | None) -> Iterator[StationSession]:
     """With the station that runs from ``data_dir`` (None: the settings'). Raises BadRequestError where there is none,
     StationError, StorageError."""
     settings = load_settings(data_dir=data_dir)

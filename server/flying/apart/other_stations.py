@@ -15,12 +15,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from server.door.alarms import Alarms
 from server.door.hub import Hub
+from server.door.station_files import station_of
+from server.errors import StartError, error_doc
+from server.flying.apart.commanded_there import own_number
 from server.flying.apart.nearness import AHEAD_S, STANDS_M_S, STRAIGHT_S, VEER_SHARE, Flown
 from server.flying.apart.others_heard import NODE_SILENT_S, is_vague, name_of, row_of_others, with_missing
 from server.heard.node_states import Nodes
 from server.heard.relay import Relay
-from server.schemas import CheckRow, OtherStationDoc, OtherVehicleDoc, StationsMessage
+from server.schemas import CheckRow, ErrorDoc, OtherStationDoc, OtherVehicleDoc, StationsMessage
 from telemetry.bus.bus import Bus
 from telemetry.topics.messages import Topic
 from telemetry.topics.station_vehicles import FleetVehicle, OtherVehicle, OwnVehicles, StationsStatus
@@ -34,7 +38,8 @@ UNCOMPARED_S = 10.0
 """Added to the age of what came from a station whose clock was not compared yet."""
 FASTEST_M_S = 15.0
 """Of a vehicle that tells no velocity: so fast it may fly, anywhere."""
-TELL_EVERY_S, SHOW_EVERY_S = 0.2, 0.5
+TELL_EVERY_S, SHOW_EVERY_S, LOOK_FOR_FILE_S = 0.2, 0.5, 2.0
+_UNMET = "Other stations are neither seen nor told anything. Own vehicles are not affected."
 _NODE_SILENT = (
     "The stations node does not answer: other stations are neither seen nor told anything. Own vehicles are not "
     "affected. It is started again by itself."
@@ -43,9 +48,8 @@ _NODE_SILENT = (
 
 @dataclass(frozen=True, slots=True)
 class Meeting:
-    """Who this station is among others, and where it meets them."""
+    """Where this station meets others, and the file that says who it is among them."""
 
-    name: str
     routers: tuple[str, ...]
     file: Path
 
@@ -65,12 +69,37 @@ class OtherStations:
     ) -> None:
         self._meeting, self._bus, self._nodes, self._hub, self._own = meeting, bus, nodes, hub, own
         self._now_mono_s = now_mono_s
+        self._name, self._fault = "", ""
         self.status: StationsStatus | None = None
 
-    def loops(self) -> list[Coroutine[Any, Any, None]]:
+    def loops(self, alarms: Alarms) -> list[Coroutine[Any, Any, None]]:
         relay = Relay(self._bus)
         relay.on(Topic.STATIONS, self.on_status)
-        return [*relay.loops(), self._start(), self._tell(), self._show()]
+        return [*relay.loops(), self.start(alarms), self._tell(), self._show()]
+
+    async def start(self, alarms: Alarms) -> None:
+        """Once the station's file can be read: until then its crew flies without other stations, and is told so."""
+        meeting = self._meeting
+        while True:
+            try:
+                self._name = await asyncio.to_thread(station_of, meeting.file)
+                break
+            except StartError as error:
+                self._on_fault(error_doc(error), alarms)
+            await asyncio.sleep(LOOK_FOR_FILE_S)
+        if self._fault:
+            log.info("The station's file can be read: this station is %s.", self._name)
+        self._fault = ""
+        alarms.end("stations")
+        await self._nodes.stations(self._name, meeting.routers, meeting.file)
+
+    def _on_fault(self, error: ErrorDoc, alarms: Alarms) -> None:
+        fault = f"{error.what} {_UNMET}"
+        if fault != self._fault:
+            self._fault = fault
+            log.warning("%s (%s) %s", fault, error.where, error.advice)
+            self._hub.publish(self.message())
+        alarms.begin("stations", error.model_copy(update={"what": fault}))
 
     def on_status(self, status: StationsStatus) -> None:
         before = self.status
@@ -86,25 +115,41 @@ class OtherStations:
         """In the air and seen somewhere: each from where it was at the earliest."""
         return [_flown(other, now_s) for other in self._vehicles if other.it.in_air and other.it.lat_deg is not None]
 
+    def who_commands(self, words: str) -> str | None:
+        """What a request means that names a vehicle as ``STATION/NUMBER``: one of this station's by its number.
+
+        None: it names no station. Raises OtherStationError where another station commands it, or nobody known.
+        """
+        return own_number(words, self._name, self.status, self._now_mono_s())
+
+    def elsewhere(self, number: int) -> str:
+        """Which of the others have a vehicle of that number, in words; empty: none."""
+        have = [f"{other.station}/{number}" for other in self._vehicles if other.it.number == number]
+        return f"{', '.join(have)} is another station's: only that one commands it." if have else ""
+
     def row(self) -> CheckRow:
         """Of the check before a start."""
-        return row_of_others(self.status, self._now_mono_s())
+        return row_of_others(self.status, self._now_mono_s(), self._fault)
 
     def message(self) -> StationsMessage:
         now_s, status = self._now_mono_s(), self.status
         if status is None:
             return StationsMessage(
-                station=self._meeting.name,
+                now_mono_s=now_s,
+                old_s=OLD_S,
+                station=self._name,
                 router="lost",
-                text="Other stations are being looked for.",
+                text=self._fault or "Other stations are being looked for.",
                 stations=[],
                 refused=0,
             )
         silent = now_s - status.t_mono_s > NODE_SILENT_S
         return StationsMessage(
-            station=self._meeting.name,
+            now_mono_s=now_s,
+            old_s=OLD_S,
+            station=self._name or status.station,
             router="lost" if silent else status.router,
-            text=_NODE_SILENT if silent else status.text,
+            text=self._fault or (_NODE_SILENT if silent else status.text),
             stations=[
                 OtherStationDoc(
                     name=station.name,
@@ -123,9 +168,6 @@ class OtherStations:
     @property
     def _vehicles(self) -> tuple[OtherVehicle, ...]:
         return () if self.status is None else self.status.vehicles
-
-    async def _start(self) -> None:
-        await self._nodes.stations(self._meeting.name, self._meeting.routers, self._meeting.file)
 
     async def _tell(self) -> None:
         while True:
@@ -201,10 +243,14 @@ def _doc(other: OtherVehicle, now_s: float) -> OtherVehicleDoc:
         alt_amsl_m=it.alt_amsl_m,
         alt_surface_m=it.alt_surface_m,
         ground_speed_m_s=None if it.v_enu_m_s is None else math.hypot(*it.v_enu_m_s[:2]),
+        in_charge=it.in_charge,
+        in_charge_silent=it.in_charge_silent,
         mode=it.mode,
+        phase=it.phase,
         armed=it.armed,
         in_air=it.in_air,
         link=it.link,
+        battery_share=it.battery_share,
         battery=it.battery,
         plan=it.plan,
         plan_share=it.plan_share,

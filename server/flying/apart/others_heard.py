@@ -71,8 +71,13 @@ def _after(before: OtherVehicle, now: OtherVehicle | None, station: OtherStation
     return now
 
 
-def row_of_others(status: StationsStatus | None, now_s: float) -> CheckRow:
-    """Of the check before a start: where another station's vehicle will be, nothing tells here."""
+def row_of_others(status: StationsStatus | None, now_s: float, fault: str = "") -> CheckRow:
+    """Of the check before a start: where another station's vehicle will be, nothing tells here.
+
+    ``fault``: why none can be met, whatever is still heard by a node of the server before this one.
+    """
+    if fault:
+        return _row("accept", f"{fault} Whether vehicles of others fly is not known.")
     if status is None or status.router == "lost" or now_s - status.t_mono_s > NODE_SILENT_S:
         return _row("accept", "Other stations are not heard: whether their vehicles fly is not known.")
     since_s = status.listens_since_t_mono_s

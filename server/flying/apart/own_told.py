@@ -8,12 +8,21 @@ from telemetry.topics.messages import LinkStatus
 from telemetry.topics.station_vehicles import FleetVehicle
 
 
-def fleet_vehicle(doc: VehicleDoc, channel: Channel, link: LinkStatus | None) -> FleetVehicle:
-    """``doc``: as this station's own pages are told of it."""
+def fleet_vehicle(
+    doc: VehicleDoc, channel: Channel, link: LinkStatus | None, *, in_charge_silent: bool = False
+) -> FleetVehicle:
+    """``doc``: as this station's own pages are told of it. ``in_charge_silent``: nothing is heard of its holder."""
     alarm = "" if doc.alarm is None else doc.alarm.text
     state, follow = channel.state, channel.follow
     if state is None:
-        return FleetVehicle(doc.number, doc.name, link=doc.link, alarm=alarm)
+        return FleetVehicle(
+            doc.number,
+            doc.name,
+            in_charge=doc.holder or "",
+            in_charge_silent=in_charge_silent,
+            link=doc.link,
+            alarm=alarm,
+        )
     velocity = None
     if state.v_east_m_s is not None and state.v_north_m_s is not None and state.v_down_m_s is not None:
         velocity = state.v_east_m_s, state.v_north_m_s, -state.v_down_m_s
@@ -21,7 +30,10 @@ def fleet_vehicle(doc: VehicleDoc, channel: Channel, link: LinkStatus | None) ->
     return FleetVehicle(
         number=doc.number,
         name=doc.name,
+        in_charge=doc.holder or "",
+        in_charge_silent=in_charge_silent,
         mode=state.mode,
+        phase=doc.phase,
         armed=state.armed,
         in_air=channel.in_air,
         link=doc.link,

@@ -1,12 +1,17 @@
 import { duration } from "../format";
 import type { OtherStationDoc } from "../messages";
 import { failed, late_s } from "../store/reach";
-import { stations, words, wrong } from "../store/stations";
+import { inCharge, isOld, sinceTold_s, stations, words, wrong } from "../store/stations";
 import { Icon } from "../ui/Icon";
 
 function Station({ station, isPast }: { station: OtherStationDoc; isPast: boolean }) {
   const { name, state, silent_s, vehicles } = station;
-  const told = state === "lost" ? `silent for ${duration(silent_s)}` : vehicles.length ? "" : "no vehicle";
+  const told =
+    state === "lost"
+      ? `silent for ${duration(silent_s + sinceTold_s())}`
+      : vehicles.length
+        ? ""
+        : "no vehicle";
   return (
     <>
       {told && (
@@ -17,14 +22,14 @@ function Station({ station, isPast }: { station: OtherStationDoc; isPast: boolea
       {vehicles.map((vehicle) => (
         <li
           key={vehicle.number}
-          class={vehicle.is_old || isPast ? "old" : ""}
+          class={isOld(vehicle) || isPast ? "old" : ""}
           title={[words(vehicle), vehicle.battery, vehicle.plan, vehicle.text].filter(Boolean).join(". ")}
           data-testid={`other-${name}-${vehicle.number}`}
         >
           <strong>
             {name}: {vehicle.name}
           </strong>{" "}
-          {isPast ? "as last heard" : words(vehicle)}
+          {isPast ? `as last heard · ${inCharge(vehicle)}` : words(vehicle)}
         </li>
       ))}
     </>

@@ -15,7 +15,7 @@ import { forgetClock, takeClock } from "./server_clock";
 import { radarFiles, runs } from "./studies";
 import { forgetAsked, takeAnswer, takeSelection, takeView } from "./shared";
 import * as state from "./state";
-import { stations } from "./stations";
+import { takeStations } from "./stations";
 import { traversability } from "./traversability";
 
 /** Takes one message of the stream into the page's state. */
@@ -63,7 +63,7 @@ export function receive(message: ServerMessage): void {
       takeFleet(message);
       return;
     case "stations":
-      stations.value = message;
+      takeStations(message, performance.now());
       return;
     case "alarms":
       alarms.value = message.alarms;

@@ -1,13 +1,35 @@
 import { computed, signal } from "@preact/signals";
-import { metres, withUnit } from "../format";
+import { metres, number, withUnit } from "../format";
 import type { OtherStationDoc, OtherVehicleDoc, StationsMessage } from "../messages";
+import { now_ms } from "./clock";
+import { serverNow_s } from "./server_clock";
 
 /** Other stations and their vehicles, which only their own stations command; null where none are met. */
 export const stations = signal<StationsMessage | null>(null);
 
+let received_ms = 0;
+
+export function takeStations(message: StationsMessage, at_ms: number): void {
+  received_ms = at_ms;
+  stations.value = message;
+}
+
 export const forgetStations = () => {
   stations.value = null;
 };
+
+/** Since the ages in the newest message were true: what waited on a slow line, and what has passed here since. */
+export function sinceTold_s(): number {
+  const told_s = stations.value?.now_mono_s;
+  if (told_s === undefined) return 0;
+  const least_s = Math.max(0, now_ms.value - received_ms) / 1000;
+  const server_s = serverNow_s(now_ms.value);
+  return server_s === null ? least_s : Math.max(least_s, server_s - told_s);
+}
+
+/** Whether its position says no more where it is; of an age that is not known the station said so. */
+export const isOld = ({ is_old, age_s }: OtherVehicleDoc): boolean =>
+  is_old || (age_s !== null && age_s + sinceTold_s() > (stations.value?.old_s ?? 0));
 
 /** Its height, and above what; of several the one that tells most about the ground. */
 function height({ alt_surface_m, alt_rel_home_m, alt_amsl_m }: OtherVehicleDoc): string {
@@ -16,17 +38,45 @@ function height({ alt_surface_m, alt_rel_home_m, alt_amsl_m }: OtherVehicleDoc):
   return alt_amsl_m === null ? "height ?" : `${metres(alt_amsl_m, 0)} AMSL`;
 }
 
-/** How old its position is, at the worse end. */
+/** How old its position is by now, at the worse end. */
 function age({ age_s, lat_deg }: OtherVehicleDoc): string {
   if (lat_deg === null) return "no position";
-  return age_s === null ? "age ?" : `${withUnit(age_s, "s", age_s < 10 ? 1 : 0)} old`;
+  if (age_s === null) return "age ?";
+  const by_now_s = age_s + sinceTold_s();
+  return `${withUnit(by_now_s, "s", by_now_s < 10 ? 1 : 0)} old`;
+}
+
+const PHASES: Partial<Record<string, string>> = {
+  arming: "is being armed",
+  taking_off: "takes off",
+  flying: "flies its plan",
+  paused: "holds",
+  returning: "returns",
+  landed: "landed",
+  interrupted: "broken off",
+};
+
+/** Who commands it at its own station: whom to ask for by name when that one is called. */
+export function inCharge({ in_charge, in_charge_silent }: OtherVehicleDoc): string {
+  if (!in_charge) return "nobody is in charge";
+  return `${in_charge} is in charge${in_charge_silent ? ", not heard there" : ""}`;
 }
 
 /** Age and height first: what is old says little else. */
 export function words(vehicle: OtherVehicleDoc): string {
-  const { ground_speed_m_s, mode, armed } = vehicle;
+  const { ground_speed_m_s, mode, armed, phase, battery_share } = vehicle;
   const speed = ground_speed_m_s === null ? "" : withUnit(ground_speed_m_s, "m/s", 1);
-  return [age(vehicle), height(vehicle), speed, mode, armed ? "armed" : "disarmed"]
+  const battery = battery_share === null ? "" : `${number(100 * battery_share)} %`;
+  return [
+    age(vehicle),
+    height(vehicle),
+    speed,
+    mode,
+    armed ? "armed" : "disarmed",
+    PHASES[phase] ?? "",
+    battery,
+    inCharge(vehicle),
+  ]
     .filter(Boolean)
     .join(" · ");
 }
