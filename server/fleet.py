@@ -14,6 +14,7 @@ from server.flying.apart.airspace import Airspace
 from server.flying.apart.nearness import Nearness
 from server.flying.apart.other_stations import Meeting, OtherStations
 from server.flying.apart.other_vehicles import OtherVehicles
+from server.flying.apart.own_lines import OwnLines
 from server.flying.apart.own_told import fleet_vehicle
 from server.flying.bags.bag_desk import BagDesk
 from server.flying.checklists import Checklists
@@ -66,7 +67,10 @@ class Fleet:
         self.recordings = RecordingDesk(shelf, workspace.board, self.reviewing, present)
         self.bags = BagDesk(library, workspace.board, self.recordings)
         self.uwb = LiveUwb(workspace.traversability, library, self.first.bus)
-        self._stations = meeting and OtherStations(meeting, self.first.bus, self.first.nodes, shared.hub, self._own)
+        self._lines = OwnLines({flying.number: flying.live for flying in flights})
+        self._stations = meeting and OtherStations(
+            meeting, self.first.bus, self.first.nodes, shared.hub, self._own, self._lines.lines
+        )
         stations = self._stations
         self._nearness = Nearness(
             {flying.number: (flying.name, flying.live) for flying in flights},
@@ -76,6 +80,7 @@ class Fleet:
             {flying.number: flying.as_other for flying in flights},
             {flying.number: flying.desk.on_others for flying in flights},
             elsewhere=(lambda: None) if stations is None else stations.row,
+            flown_elsewhere=(lambda _: ()) if stations is None else stations.flown,
         )
         self._scenery = Scenery(
             workspace.stage,
@@ -165,6 +170,7 @@ class Fleet:
             self._hear_of_plan(),
             *([self._tell(), self._nearness.run(), self._others.run()] if self._has_others else []),
             *([self.first.nodes.no_stations()] if self._stations is None else self._stations.loops(alarms)),
+            *([] if self._stations is None else [self._lines.run()]),
             self.recordings.run(),
             self._scenery.run(),
             self._airspace.run(),
@@ -214,10 +220,17 @@ class Fleet:
         return len(self._flights) > 1 or self._stations is not None
 
     def _own(self) -> list[FleetVehicle]:
+        """As other stations are told of them."""
         near = self._nearness.alarms
         return [
-            fleet_vehicle(f.doc(near.get(f.number)), f.live, f.connections.status, in_charge_silent=f.lease.is_silent)
-            for f in self.flights
+            fleet_vehicle(
+                flying.doc(near.get(flying.number)),
+                flying.live,
+                flying.connections.status,
+                in_charge_silent=flying.lease.is_silent,
+                line=self._lines.told(flying.number),
+            )
+            for flying in self.flights
         ]
 
     @property

@@ -27,6 +27,8 @@ from telemetry.topics.vehicle import VehicleState
 
 NO_FLIGHT = FlightStatus()
 _OFF_PLAN = ("returning", "landed", "interrupted")
+OFF_LINE_M = 15.0
+"""Who is farther from its line has left it: other stations are not told that it flies that."""
 MARGIN_M = 400.0
 """Around a plan: what lies farther away is not asked for, and a large model would take seconds and gigabytes."""
 
@@ -157,6 +159,20 @@ class Follower:
         return Ahead(
             lat_lon_deg, points_m[:, 2] - reference.home_alt_dsm_m, np.maximum.accumulate(np.maximum(t_s, 0.0))
         )
+
+    @property
+    def followed(self) -> Followed | None:
+        """None without a plan; another plan, or the same one anew, is another object."""
+        return self._followed
+
+    def line_s(self, flight: FlightStatus) -> float | None:
+        """Where on the plan's line it is, by the line's own times; None where it does not fly that, or is beside it."""
+        followed, at = self._followed, self._following.at
+        if followed is None or at is None or not self._following.begun or flight.phase != "flying":
+            return None
+        if math.hypot(at.cross_track_m, at.height_error_m) > OFF_LINE_M:
+            return None
+        return finite_or_none(planned_s(followed.reference, at.leg, at.share))
 
     def whole(self) -> Whole | None:
         """None where no plan is known."""

@@ -22,9 +22,9 @@ from telemetry.errors import StationsError
 from telemetry.stations.roster import Roster
 from telemetry.stations.router_wire import Wire
 from telemetry.stations.station_messages import encode
-from telemetry.stations.station_names import beacon_key, checked_name, vehicle_key
+from telemetry.stations.station_names import beacon_key, checked_name, line_key, vehicle_key
 from telemetry.stations.station_proof import Route, ends_soon, why_refused
-from telemetry.stations.when_told import Telling
+from telemetry.stations.when_told import LineTelling, Telling
 from telemetry.topics.messages import Topic
 from telemetry.topics.station_vehicles import OwnVehicles, StationsStatus
 
@@ -45,6 +45,7 @@ class StationsNode:
         self._bus, self._context, self._station, self._route = bus, context, station, route
         run = secrets.randbits(32)
         self._roster, self._telling = Roster(station, run), Telling(run)
+        self._lines = LineTelling()
         self._own = OwnVehicles(0.0)
         self._wire: Wire | None = None
         self._fault = self._ends = ""
@@ -104,6 +105,10 @@ class StationsNode:
                 wire.put(beacon_key(self._station), encode(beacon))
             for number, message in self._telling.due(self._own.vehicles, now_s):
                 wire.put(vehicle_key(self._station, number), encode(message))
+            self._lines.want(self._roster.take_wanted())
+            due = self._lines.due({line.number: line.packed for line in self._own.lines}, now_s)
+            if due is not None:
+                wire.put(line_key(self._station, due[0]), due[1])
             await asyncio.sleep(TURN_S)
 
     async def _hear_others(self, wire: Wire) -> None:
@@ -166,6 +171,7 @@ class StationsNode:
             leaves_out=leaves_out,
             stations=roster.stations(now_s, time.time()),
             vehicles=roster.vehicles(now_s),
+            lines=roster.lines(),
             refused=roster.refused,
             refused_last=roster.refused_last,
         )

@@ -9,8 +9,9 @@ from datetime import UTC, datetime
 
 from telemetry.errors import StationsError
 from telemetry.stations.compared_clocks import DRIFT, Clocks
-from telemetry.stations.station_messages import BeaconWire, HeardWire, VehicleWire, vehicle_of
-from telemetry.topics.station_vehicles import OtherStation, OtherVehicle
+from telemetry.stations.plan_lines import line_id
+from telemetry.stations.station_messages import BeaconWire, HeardWire, VehicleWire, WantWire, vehicle_of
+from telemetry.topics.station_vehicles import FleetLine, OtherStation, OtherVehicle
 
 LOST_S = 4.0
 """It sends once a second and more; a packet that is lost costs a second at most."""
@@ -47,6 +48,7 @@ class Other:
         self._utc_less_mono_s = 0.0
         self._clocks = Clocks()
         self._vehicles: dict[int, _Heard] = {}
+        self._lines: dict[int, bytes] = {}
 
     @property
     def was_flying(self) -> bool:
@@ -96,6 +98,33 @@ class Other:
         if not self._clocks.on_exchange(**stamps, came_s=now_s):
             raise StationsError(f"The times that {self._name} tells of an exchange cannot be true.")
         self._hears_us_s = now_s
+
+    def on_line(self, number: int, payload: bytes) -> None:
+        """One of a plan that has changed meanwhile is late, and no fault."""
+        if self._told_line(number) == line_id(payload):
+            self._lines[number] = payload
+
+    def wants(self, now_s: float) -> list[WantWire]:
+        """Lines of which it tells and that have not come."""
+        if now_s - self.heard_s >= LOST_S:
+            return []
+        have = {line.number for line in self.lines()}
+        return [
+            WantWire(self._name, number)
+            for number in sorted(self._vehicles)
+            if self._told_line(number) and number not in have
+        ]
+
+    def lines(self) -> list[FleetLine]:
+        """Those that its vehicles fly now."""
+        self._lines = {
+            number: payload for number, payload in self._lines.items() if self._told_line(number) == line_id(payload)
+        }
+        return [FleetLine(self._name, number, payload) for number, payload in sorted(self._lines.items())]
+
+    def _told_line(self, number: int) -> int:
+        heard = self._vehicles.get(number)
+        return 0 if heard is None else heard.wire.line
 
     def told(self, now_s: float, now_utc_s: float) -> OtherStation:
         compared = self._clocks.now(now_s)

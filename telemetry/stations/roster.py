@@ -7,11 +7,22 @@ from collections import deque
 
 from telemetry.errors import StationsError
 from telemetry.stations.other import LOST_S, Other
-from telemetry.stations.station_messages import BEACON_BYTES, VEHICLE_BYTES, BeaconWire, VehicleWire, decode
+from telemetry.stations.plan_lines import unpacked
+from telemetry.stations.station_messages import (
+    BEACON_BYTES,
+    MOST_WANTS,
+    VEHICLE_BYTES,
+    BeaconWire,
+    VehicleWire,
+    WantWire,
+    decode,
+)
 from telemetry.stations.station_names import MOST_STATIONS, Key, read_key
-from telemetry.topics.station_vehicles import OtherStation, OtherVehicle
+from telemetry.topics.station_vehicles import FleetLine, OtherStation, OtherVehicle
 
 _BEACONS_KEPT = 128
+MOST_LINES = 64
+"""Of other stations' vehicles: what is more is not known, and taken to fly straight on."""
 _LATELY_S = 30.0
 
 
@@ -25,6 +36,7 @@ class Roster:
         self._sent_us: deque[int] = deque(maxlen=_BEACONS_KEPT)
         self._namesake_s = self._too_many_s = self._overflow_s = -math.inf
         self._not_understood: set[str] = set()
+        self._wanted: set[int] = set()
         self.refused, self.refused_last = 0, ""
 
     def on_message(self, key: str, payload: bytes, *, now_s: float, now_utc_s: float) -> None:
@@ -49,7 +61,25 @@ class Roster:
         self._sent_us.append(sent_us)
         heard = [back for other in self._others.values() if (back := other.newest(now_s)) is not None]
         utc_ms = max(0, round(now_utc_s * 1000))
-        return BeaconWire(self._run, self._beacons, sent_us, utc_ms, min(vehicles, 999), tuple(heard))
+        return BeaconWire(
+            self._run, self._beacons, sent_us, utc_ms, min(vehicles, 999), tuple(heard), self._wants(now_s)
+        )
+
+    def _wants(self, now_s: float) -> tuple[WantWire, ...]:
+        """Not all at once, and not always the same: one that never comes keeps no other one away."""
+        wants = [want for name in sorted(self._others) for want in self._others[name].wants(now_s)]
+        from_here = self._beacons * MOST_WANTS % len(wants) if wants else 0
+        return tuple((wants[from_here:] + wants[:from_here])[:MOST_WANTS])
+
+    def take_wanted(self) -> set[int]:
+        """Numbers of own vehicles whose line others have asked for since."""
+        wanted, self._wanted = self._wanted, set()
+        return wanted
+
+    def lines(self) -> tuple[FleetLine, ...]:
+        """Of vehicles in ``vehicles``, no more than are kept."""
+        every = [line for name in sorted(self._others) for line in self._others[name].lines()]
+        return tuple(every[:MOST_LINES])
 
     def stations(self, now_s: float, now_utc_s: float) -> tuple[OtherStation, ...]:
         return tuple(self._others[name].told(now_s, now_utc_s) for name in sorted(self._others))
@@ -74,6 +104,9 @@ class Roster:
         key = read_key(text)
         if key is None:
             raise StationsError("A message came under a name that no station uses.")
+        if key.is_line:
+            self._take_line(key, payload)
+            return
         message = self._read(key, payload, now_s)
         if key.station == self._own:
             if message.run != self._run:
@@ -90,7 +123,15 @@ class Roster:
             if back is not None and mine and back.sent_us not in self._sent_us:
                 raise StationsError(f"{key.station} answers what this station has not said lately.")
             other.on_beacon(message, back if mine else None, now_s, now_utc_s)
+            self._wanted.update(want.vehicle for want in message.wants if want.station == self._own)
             self._not_understood.discard(key.station)
+
+    def _take_line(self, key: Key, payload: bytes) -> None:
+        """Raises StationsError: malformed."""
+        other = self._others.get(key.station)
+        if key.station != self._own and other is not None:
+            unpacked(payload)
+            other.on_line(key.vehicle or 0, payload)
 
     def _read(self, key: Key, payload: bytes, now_s: float) -> VehicleWire | BeaconWire:
         """Of a station that is not understood it is not known whether it flies. Raises StationsError."""

@@ -22,7 +22,7 @@ from telemetry.stations.station_names import EVERYTHING, MOST_STATIONS, MOST_VEH
 from telemetry.stations.station_proof import Route, read_proof
 
 CONNECT_S = 3.0
-_MOST_WAITING = MOST_STATIONS * (MOST_VEHICLES + 1)
+_MOST_WAITING = MOST_STATIONS * (2 * MOST_VEHICLES + 1)
 _SETTINGS: dict[str, Any] = {
     "mode": "client",
     "scouting/multicast/enabled": False,

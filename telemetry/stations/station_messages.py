@@ -12,13 +12,13 @@ from typing import Annotated, TypeVar
 import msgspec
 
 from telemetry.errors import StationsError
-from telemetry.stations.station_names import MOST_STATIONS
+from telemetry.stations.station_names import MOST_STATIONS, MOST_VEHICLES
 from telemetry.topics.station_vehicles import FleetVehicle, VehicleLink
 
 VEHICLE_BYTES, BEACON_BYTES = 500, 4096
 """Longer ones are refused unread: two of a vehicle in a second, with all that TLS and TCP add, stay under 2 kB."""
 NAME_BYTES, MODE_BYTES, BATTERY_BYTES, PLAN_BYTES, ALARM_BYTES = 40, 20, 48, 48, 150
-IN_CHARGE_BYTES = 40
+IN_CHARGE_BYTES, MOST_WANTS = 40, 8
 _LINKS: tuple[VehicleLink, ...] = ("none", "live", "stale", "lost")
 _PHASES = "idle", "arming", "taking_off", "flying", "paused", "returning", "landed", "interrupted"
 """Of a flight; on the wire each is its place here."""
@@ -64,6 +64,10 @@ class VehicleWire(msgspec.Struct, array_like=True, frozen=True, forbid_unknown_f
     plan_share: Permille
     alarm: Words
     in_charge: Words
+    line: Count
+    """Of the plan that is flown; 0: none is told"""
+    line_ms: Annotated[int, Meta(ge=0, lt=2**32)] | None
+    """Where on it the position was, by the line's times; None: not on it"""
 
 
 class HeardWire(msgspec.Struct, array_like=True, frozen=True, forbid_unknown_fields=True):
@@ -77,6 +81,13 @@ class HeardWire(msgspec.Struct, array_like=True, frozen=True, forbid_unknown_fie
     """On the clock of who tells this."""
 
 
+class WantWire(msgspec.Struct, array_like=True, frozen=True, forbid_unknown_fields=True):
+    """A line of which a vehicle's messages tell and that has not come: its station sends it again."""
+
+    station: Annotated[str, Meta(max_length=24)]
+    vehicle: Annotated[int, Meta(ge=1, le=MOST_VEHICLES)]
+
+
 class BeaconWire(msgspec.Struct, array_like=True, frozen=True, forbid_unknown_fields=True):
     """A station lives; with ``heard`` the four stamps of an exchange are complete at whoever is named in it."""
 
@@ -86,6 +97,7 @@ class BeaconWire(msgspec.Struct, array_like=True, frozen=True, forbid_unknown_fi
     utc_ms: Annotated[int, Meta(ge=0, lt=2**48)]
     vehicles: Annotated[int, Meta(ge=0, le=999)]
     heard: Annotated[tuple[HeardWire, ...], Meta(max_length=MOST_STATIONS)]
+    wants: Annotated[tuple[WantWire, ...], Meta(max_length=MOST_WANTS)] = ()
 
 
 def vehicle_wire(of: FleetVehicle, *, run: int, count: int, now_mono_s: float) -> VehicleWire:
@@ -118,6 +130,8 @@ def vehicle_wire(of: FleetVehicle, *, run: int, count: int, now_mono_s: float) -
         plan_share=_share(of.plan_share),
         alarm=cleaned(of.alarm, ALARM_BYTES),
         in_charge=cleaned(of.in_charge, IN_CHARGE_BYTES),
+        line=of.line,
+        line_ms=None if of.line_s is None or not of.line else _scaled(max(0.0, of.line_s), 1000, 2**32 - 1),
     )
 
 
@@ -148,6 +162,8 @@ def vehicle_of(wire: VehicleWire, number: int, position_t_mono_s: float | None) 
         plan=cleaned(wire.plan, PLAN_BYTES),
         plan_share=_of(wire.plan_share, 1000),
         alarm=cleaned(wire.alarm, ALARM_BYTES),
+        line=wire.line,
+        line_s=_of(wire.line_ms, 1000) if wire.line else None,
     )
 
 

@@ -1,7 +1,7 @@
 """Names of what stations tell each other, and what a station's own name may be.
 
-``hedgehop/stations/1/NAME/vehicle/NUMBER`` and ``hedgehop/stations/1/NAME/beacon``: a station puts below its own name
-only, which the router holds it to (``telemetry/stations/router_file.py``).
+``hedgehop/stations/1/NAME/vehicle/NUMBER``, ``.../NAME/line/NUMBER`` and ``.../NAME/beacon``: a station puts below
+its own name only, which the router holds it to (``telemetry/stations/router_file.py``).
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ class Key(NamedTuple):
     station: str
     vehicle: int | None
     """None: the station's beacon."""
+    is_line: bool = False
+    """The line that the vehicle flies, not how it is."""
 
 
 def checked_name(name: str) -> str:
@@ -46,6 +48,10 @@ def vehicle_key(station: str, number: int) -> str:
     return f"{ROOT}/{station}/vehicle/{number}"
 
 
+def line_key(station: str, number: int) -> str:
+    return f"{ROOT}/{station}/line/{number}"
+
+
 def beacon_key(station: str) -> str:
     return f"{ROOT}/{station}/beacon"
 
@@ -58,9 +64,9 @@ def read_key(text: str) -> Key | None:
     match parts[1:]:
         case ["beacon"]:
             return Key(parts[0], None)
-        case ["vehicle", number] if number.isascii() and number.isdecimal() and len(number) <= 2:
+        case ["vehicle" | "line" as what, number] if number.isascii() and number.isdecimal() and len(number) <= 2:
             at = int(number)
-            return Key(parts[0], at) if 1 <= at <= MOST_VEHICLES and str(at) == number else None
+            return Key(parts[0], at, what == "line") if 1 <= at <= MOST_VEHICLES and str(at) == number else None
     return None
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from telemetry.stations.station_messages import VehicleWire, vehicle_wire
 from telemetry.stations.station_names import MOST_VEHICLES
 from telemetry.topics.station_vehicles import FleetVehicle
 
 CHANGING_S, STILL_S = 0.5, 2.0
+LINE_BYTES_PER_S, LINE_AGAIN_S = 3000.0, 4.0
+"""A tenth of a line of 256 kbit/s for all vehicles' lines together; the same one is sent no sooner again."""
 _SLACK_S = 0.02
 """Who looks ten times a second looks a little early or late."""
 
@@ -57,7 +59,37 @@ def _coarse(of: FleetVehicle) -> object:
         of.plan,
         of.alarm,
         of.name,
+        of.line,
+        of.line_s is None,
     )
+
+
+class LineTelling:
+    """Lines that somebody wants, one after the other: they share the way with positions, and these come first."""
+
+    def __init__(self) -> None:
+        self._wanted: dict[int, None] = {}
+        self._sent: dict[int, tuple[float, bytes]] = {}
+        self._free_s = -math.inf
+
+    def want(self, numbers: Iterable[int]) -> None:
+        self._wanted.update(dict.fromkeys(numbers))
+
+    def due(self, lines: Mapping[int, bytes], now_s: float) -> tuple[int, bytes] | None:
+        """Number and line of the vehicle whose line is to be sent now."""
+        if now_s < self._free_s:
+            return None
+        for number in list(self._wanted):
+            del self._wanted[number]
+            sent_s, before = self._sent.get(number, (-math.inf, b""))
+            line = lines.get(number)
+            # What was sent to all a moment ago is still under way to who wants it, too.
+            if line is None or (line == before and now_s - sent_s < LINE_AGAIN_S):
+                continue
+            self._sent[number] = now_s, line
+            self._free_s = now_s + len(line) / LINE_BYTES_PER_S
+            return number, line
+        return None
 
 
 def _step(value: float | None, size: float) -> int | None:

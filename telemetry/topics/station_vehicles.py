@@ -54,6 +54,20 @@ class FleetVehicle:
     """So much of it is flown, 0 to 1."""
     alarm: str = ""
     """The worst that is wrong with it."""
+    line: int = 0
+    """Of the plan that it flies: what its ``FleetLine`` is known by; 0: none is told."""
+    line_s: float | None = None
+    """Where on that line it was at its position, by the line's own times; None: it has left it, or holds."""
+
+
+@dataclass(frozen=True, slots=True)
+class FleetLine:
+    """The line that a vehicle flies, as ``telemetry.stations.plan_lines`` packs it."""
+
+    station: str
+    """Empty: this one."""
+    number: int
+    packed: bytes
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +76,7 @@ class OwnVehicles:
 
     t_mono_s: float
     vehicles: tuple[FleetVehicle, ...] = ()
+    lines: tuple[FleetLine, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +137,8 @@ class StationsStatus:
     """Why stations that speak are not among these; empty: none that is known of."""
     stations: tuple[OtherStation, ...] = ()
     vehicles: tuple[OtherVehicle, ...] = ()
+    lines: tuple[FleetLine, ...] = ()
+    """Of those of them whose line has come."""
     refused: int = 0
     """Messages that were malformed, foreign, repeated, or more than are kept."""
     refused_last: str = ""

@@ -48,7 +48,7 @@ def test_before_a_start_all_that_is_known_of_is_heard_and_stands() -> None:
         (heard(replace(BRAVO, sent_t_mono_s=None), *STANDS), "clock of Bravo is not compared yet"),
         (heard(replace(BRAVO, sent_t_mono_s=NOW_S - 20.0), *STANDS), "what Bravo says comes 20 s late"),
         (heard(replace(BRAVO, is_new=True), *STANDS), "Bravo has only just started again"),
-        (heard(BRAVO, STANDS[0], other(number=2, link="live")), "In the air, and no plan tells where it will be"),
+        (heard(BRAVO, STANDS[0], other(number=2, link="live")), "In the air, and nothing tells all that it will fly"),
     ],
 )
 def test_before_a_start_nothing_that_is_not_heard_is_taken_for_clear(status: StationsStatus | None, words: str) -> None:

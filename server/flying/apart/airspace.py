@@ -70,7 +70,9 @@ class Airspace:
                 known = newest.get(placed.it.key)
                 if known is None or placed.it.age_s < known.it.age_s:
                     newest[placed.it.key] = placed
-        others = () if stations is None else placed_vehicles(stations.vehicles, stage.dsm, time.monotonic())
+        others = ()
+        if stations is not None and self._stations is not None:
+            others = placed_vehicles(stations.vehicles, stage.dsm, time.monotonic(), self._stations.line_of)
         aircraft = sorted(newest.values(), key=lambda placed: (not placed.it.conflict, placed.it.distance_m or 0.0))
         stage.show(aircraft, tuple(others))
 

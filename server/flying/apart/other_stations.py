@@ -11,7 +11,7 @@ import logging
 import math
 import time
 from collections.abc import Callable, Coroutine, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +22,14 @@ from server.errors import StartError, error_doc
 from server.flying.apart.commanded_there import own_number
 from server.flying.apart.nearness import AHEAD_S, STANDS_M_S, STRAIGHT_S, VEER_SHARE, Flown
 from server.flying.apart.others_heard import NODE_SILENT_S, is_vague, name_of, row_of_others, with_missing
+from server.flying.apart.others_lines import OthersLines, ahead_of
 from server.heard.node_states import Nodes
 from server.heard.relay import Relay
 from server.schemas import CheckRow, ErrorDoc, OtherStationDoc, OtherVehicleDoc, StationsMessage
 from telemetry.bus.bus import Bus
+from telemetry.stations.plan_lines import PlanLine
 from telemetry.topics.messages import Topic
-from telemetry.topics.station_vehicles import FleetVehicle, OtherVehicle, OwnVehicles, StationsStatus
+from telemetry.topics.station_vehicles import FleetLine, FleetVehicle, OtherVehicle, OwnVehicles, StationsStatus
 from telemetry.topics.vehicle import VehicleState
 
 log = logging.getLogger("hedgehop.flying")
@@ -64,11 +66,13 @@ class OtherStations:
         nodes: Nodes,
         hub: Hub,
         own: Callable[[], Sequence[FleetVehicle]],
+        own_lines: Callable[[], Sequence[FleetLine]] = lambda: (),
         *,
         now_mono_s: Callable[[], float] = time.monotonic,
     ) -> None:
         self._meeting, self._bus, self._nodes, self._hub, self._own = meeting, bus, nodes, hub, own
-        self._now_mono_s = now_mono_s
+        self._own_lines, self._now_mono_s = own_lines, now_mono_s
+        self._lines = OthersLines()
         self._name, self._fault = "", ""
         self.status: StationsStatus | None = None
 
@@ -104,6 +108,7 @@ class OtherStations:
     def on_status(self, status: StationsStatus) -> None:
         before = self.status
         self.status = status = with_missing(before, status)
+        self._lines.on_status(status)
         was = {station.name: station.state for station in before.stations} if before else {}
         for station in status.stations:
             if station.state != was.get(station.name, station.state):
@@ -113,7 +118,15 @@ class OtherStations:
 
     def flown(self, now_s: float) -> list[Flown]:
         """In the air and seen somewhere: each from where it was at the earliest."""
-        return [_flown(other, now_s) for other in self._vehicles if other.it.in_air and other.it.lat_deg is not None]
+        return [
+            _flown(other, now_s, self._lines.of(other))
+            for other in self._vehicles
+            if other.it.in_air and other.it.lat_deg is not None
+        ]
+
+    def line_of(self, other: OtherVehicle) -> PlanLine | None:
+        """What it flies, as it is told and while it is: for the 3D view."""
+        return self._lines.of(other)
 
     def who_commands(self, words: str) -> str | None:
         """What a request means that names a vehicle as ``STATION/NUMBER``: one of this station's by its number.
@@ -171,7 +184,8 @@ class OtherStations:
 
     async def _tell(self) -> None:
         while True:
-            self._bus.publish(Topic.STATIONS_OWN, OwnVehicles(self._now_mono_s(), tuple(self._own())))
+            own = OwnVehicles(self._now_mono_s(), tuple(self._own()), tuple(self._own_lines()))
+            self._bus.publish(Topic.STATIONS_OWN, own)
             await asyncio.sleep(TELL_EVERY_S)
 
     async def _show(self) -> None:
@@ -195,9 +209,10 @@ def counts(other: OtherVehicle, now_s: float) -> bool:
     return age is not None and age <= COUNTS_S
 
 
-def _flown(other: OtherVehicle, now_s: float) -> Flown:
+def _flown(other: OtherVehicle, now_s: float, line: PlanLine | None) -> Flown:
     """It may be where it was told at the earliest of the times that are possible, or at the latest.
 
+    It is on ``line`` while its position is fresh, its age compared and its height known; else it flies straight on.
     From ``OLD_S`` on it may have flown elsewhere; after ``COUNTS_S`` it stands anywhere that it could reach until then.
     """
     it = other.it
@@ -227,7 +242,14 @@ def _flown(other: OtherVehicle, now_s: float) -> Flown:
         v_down_m_s=-up_m_s,
         horizontal_accuracy_m=it.within_m,
     )
-    return Flown(name_of(other), state, None, unsure_m, is_silent, f"{other.station} {it.number}")
+    key = f"{other.station} {it.number}"
+    left = None if line is None or it.line_s is None else ahead_of(line, it.line_s)
+    if left is None or line is None or it.alt_amsl_m is None or other.oldest_t_mono_s is None or age > OLD_S:
+        return Flown(name_of(other), state, None, unsure_m, is_silent, key)
+    ahead, fastest_m_s = left
+    # Heights on the line count above the sea, as if its home stood there.
+    state = replace(state, home_alt_amsl_m=0.0)
+    return Flown(name_of(other), state, ahead, line.error_m + fastest_m_s * unsure_s, is_silent, key)
 
 
 def _doc(other: OtherVehicle, now_s: float) -> OtherVehicleDoc:

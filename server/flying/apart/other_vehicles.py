@@ -77,10 +77,13 @@ class OtherVehicles:
         tell: Mapping[int, Callable[[CheckRow], None]],
         *,
         elsewhere: Callable[[], CheckRow | None] = lambda: None,
+        flown_elsewhere: Callable[[float], Sequence[Flown]] = lambda _: (),
         now_mono_s: Callable[[], float] = time.monotonic,
     ) -> None:
-        """``look`` and ``tell`` by the vehicle's number; ``elsewhere``: what other stations make of it."""
+        """``look`` and ``tell`` by the vehicle's number; ``elsewhere``: what other stations make of it;
+        ``flown_elsewhere``: their vehicles in the air."""
         self._look, self._tell, self._elsewhere, self._now_mono_s = look, tell, elsewhere, now_mono_s
+        self._flown_elsewhere = flown_elsewhere
 
     async def run(self) -> None:
         """Until cancelled."""
@@ -95,16 +98,47 @@ class OtherVehicles:
 
     async def look(self) -> None:
         seen = {number: look() for number, look in self._look.items()}
-        for number, row in (await asyncio.to_thread(self._rows, seen, self._elsewhere())).items():
+        elsewhere, flown = self._elsewhere(), self._flown_elsewhere(self._now_mono_s())
+        for number, row in (await asyncio.to_thread(self._rows, seen, elsewhere, flown)).items():
             self._tell[number](row)
 
-    def _rows(self, seen: Mapping[int, Other], elsewhere: CheckRow | None) -> dict[int, CheckRow]:
+    def _rows(
+        self, seen: Mapping[int, Other], elsewhere: CheckRow | None, flown: Sequence[Flown]
+    ) -> dict[int, CheckRow]:
         now_s, rows = self._now_mono_s(), {}
         for number, mine in seen.items():
             if not mine.flies or mine.waits_in_air:
                 row = row_against(mine, [other for key, other in seen.items() if key != number], now_s)
-                rows[number] = row if elsewhere is None else _together(row, elsewhere)
+                theirs = meets_elsewhere(mine, flown, now_s) or elsewhere
+                rows[number] = row if theirs is None else _together(row, theirs)
         return rows
+
+
+def meets_elsewhere(mine: Other, flown: Sequence[Flown], now_s: float) -> CheckRow | None:
+    """Bad, where it would meet another station's vehicle on the line that this one flies, by the predicted times.
+
+    None says nothing: their way home is not told, nor what flies without a line.
+    """
+    if mine.on_board is None:
+        return None
+    origin_deg = float(mine.on_board.lat_lon_deg[0, 0]), float(mine.on_board.lat_lon_deg[0, 1])
+    found = list[tuple[Nearest, Flown]]()
+    for other in flown:
+        if other.ahead is None:
+            continue
+        flat = _home_alt_m(mine.flown.state) is None
+        way_m = _way_m(mine.on_board, origin_deg, mine.flown.state, flat=flat)
+        line = line_of(other, origin_deg, now_s, flat=flat, ahead_s=None)
+        if ways_apart(way_m, line.points_enu_m, radius_m=max(RADIUS_M, line.radius_m)).distance_m >= NEAR_M:
+            continue
+        met = [nearest(one, line, since_s=now_s) for one in _timed(mine.on_board, way_m, now_s)]
+        found += [(at, other) for at in met if at is not None and at.distance_m < NEAR_M]
+    if not found:
+        return None
+    at, other = min(found, key=lambda each: (each[0].distance_m, each[0].t_s))
+    begun, begin = ("Resumed", "Resume") if mine.waits_in_air else ("Started", "Start")
+    text = f"{begun} now, it may come within {at.distance_m:.0f} m of {other.name} in {max(0.0, at.t_s - now_s):.0f} s,"
+    return _row("bad", f"{text} at {_place(origin_deg, at)}.", f"{begin} later, and call the other station.")
 
 
 def row_against(mine: Other, others: Sequence[Other], now_s: float) -> CheckRow:

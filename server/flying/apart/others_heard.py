@@ -90,7 +90,7 @@ def row_of_others(status: StationsStatus | None, now_s: float, fault: str = "") 
     if unheard := [words for station in status.stations for words in _unheard(station, status.vehicles, now_s)]:
         return _row("accept", f"{'; '.join(unheard)}. Whether they fly is not known.")
     if flies := [name_of(other) for other in status.vehicles if other.it.in_air]:
-        return _row("accept", f"In the air, and no plan tells where it will be: {', '.join(flies)}.")
+        return _row("accept", f"In the air, and nothing tells all that it will fly: {', '.join(flies)}.")
     if deaf := [station.name for station in status.stations if not station.hears_us]:
         return _row("accept", f"Not heard there: this station, by {', '.join(deaf)}, which cannot keep clear of it.")
     return _row("good", "No vehicle of another station that is heard is in the air.")

@@ -9,9 +9,15 @@ from telemetry.topics.station_vehicles import FleetVehicle
 
 
 def fleet_vehicle(
-    doc: VehicleDoc, channel: Channel, link: LinkStatus | None, *, in_charge_silent: bool = False
+    doc: VehicleDoc,
+    channel: Channel,
+    link: LinkStatus | None,
+    *,
+    in_charge_silent: bool = False,
+    line: tuple[int, float | None] = (0, None),
 ) -> FleetVehicle:
-    """``doc``: as this station's own pages are told of it. ``in_charge_silent``: nothing is heard of its holder."""
+    """``doc``: as this station's own pages are told of it. ``in_charge_silent``: nothing is heard of its holder.
+    ``line``: what the line that it flies is known by, and where on it it is."""
     alarm = "" if doc.alarm is None else doc.alarm.text
     state, follow = channel.state, channel.follow
     if state is None:
@@ -52,4 +58,6 @@ def fleet_vehicle(
         plan=doc.plan_name if is_flown else "",
         plan_share=follow.progress if is_flown and follow is not None else None,
         alarm=alarm,
+        line=line[0],
+        line_s=line[1],
     )

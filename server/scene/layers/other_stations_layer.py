@@ -15,7 +15,7 @@ from server.scene.geometry.stage import Drawing
 
 AHEAD_S = 5.0
 """A velocity line ends where its vehicle would have been after that."""
-_DOT_PX, _LINE_PX = 12.0, 3.0
+_DOT_PX, _LINE_PX, _PLAN_PX = 12.0, 3.0, 1.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,10 +30,12 @@ class PlacedVehicle:
     ahead_m: F64 | None
     """(3,) after ``AHEAD_S``; None: it tells no velocity"""
     is_old: bool
+    line_m: F64 | None = None
+    """(N, 3) what is left of the line that it flies; None: not known"""
 
 
 def other_vehicle_nodes(drawing: Drawing, vehicles: Sequence[PlacedVehicle]) -> list[Node]:
-    """A dot, a velocity line and a label each; grey where its position is old."""
+    """A dot, a velocity line, a thin line where it will fly and a label each; grey where its position is old."""
     return [node for vehicle in vehicles for node in _vehicle(drawing, vehicle)]
 
 
@@ -48,6 +50,9 @@ def _vehicle(drawing: Drawing, vehicle: PlacedVehicle) -> list[Node]:
         dots_node(f"{name}/at", points[:1], color, size_px=_DOT_PX),
         label_node(f"{name}/words", vehicle.words, raised(points[0], drawing.mark_m)),
     ]
+    if vehicle.line_m is not None:
+        left = drawing.frame.scene_from_model(np.vstack([vehicle.place_m, vehicle.line_m]))
+        nodes.append(line_node(f"{name}/line", left, color, width_px=_PLAN_PX))
     if vehicle.ahead_m is not None:
         nodes.append(line_node(f"{name}/ahead", points, color, width_px=_LINE_PX))
     return nodes
