@@ -88,9 +88,12 @@ def station_of(path: Path) -> str:
             raise StationsError("It must hold a key, the station's certificate and the authority's.")
         return checked_name(read_common_name(path))
     except (OSError, ValueError, DescribedError) as error:
-        why = error.what if isinstance(error, DescribedError) else str(error)
+        if isinstance(error, DescribedError):
+            why = error.what
+        else:
+            why = getattr(error, "strerror", None) or str(error)
         raise StartError(
-            f"The station's file cannot be used: {why}",
+            f"The station's file cannot be used: {why.rstrip('.')}.",
             where=f"{path} (setting stations_file)",
             advice="Make it with hedgehop stations, and name it as a path that this user may read.",
         ) from error

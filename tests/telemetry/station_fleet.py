@@ -8,13 +8,17 @@ import sys
 import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
+from functools import cache
 from pathlib import Path
+
+import numpy as np
 
 from server.door.certificates import CertificateFiles, now_utc
 from server.door.station_files import ROUTER_FILE, write_station_files
 from telemetry.bus.bus import Bus
+from telemetry.stations.plan_lines import MOST_POINTS, PlanLine, line_id, packed
 from telemetry.topics.messages import ServerAlive, Topic
-from telemetry.topics.station_vehicles import FleetVehicle, OtherVehicle, OwnVehicles, StationsStatus
+from telemetry.topics.station_vehicles import FleetLine, FleetVehicle, OtherVehicle, OwnVehicles, StationsStatus
 from tests.free_ports import free_port
 
 PATIENCE_S = 90.0
@@ -27,8 +31,17 @@ sys.stdin.read()
 """
 
 
+@cache
+def line_of(number: int) -> bytes:
+    """As many points as there may be, and another one for each vehicle."""
+    drawn = np.random.default_rng(number)
+    lat_lon_deg = np.array([40.0, 8.0]) + np.cumsum(drawn.normal(0.0, 5e-4, (MOST_POINTS, 2)), axis=0)
+    t_s = np.cumsum(drawn.uniform(2.0, 12.0, MOST_POINTS))
+    return packed(PlanLine(lat_lon_deg, drawn.uniform(480.0, 520.0, MOST_POINTS), t_s, 1.0))
+
+
 def own_vehicles(count: int) -> OwnVehicles:
-    """All fly, and their latitude is the time."""
+    """All fly lines, and their latitude is the time."""
     now_s = time.monotonic()
     lat_deg = 40.0 + DEG_PER_S * (now_s % 10_000)
     vehicles = (
@@ -55,10 +68,13 @@ def own_vehicles(count: int) -> OwnVehicles:
             battery="63 %, 12 min to the reserve",
             plan="Ridge survey",
             plan_share=0.4,
+            line=line_id(line_of(number)),
+            line_s=now_s % 100.0,
         )
         for number in range(1, count + 1)
     )
-    return OwnVehicles(now_s, tuple(vehicles))
+    lines = (FleetLine("", number, line_of(number)) for number in range(1, count + 1))
+    return OwnVehicles(now_s, tuple(vehicles), tuple(lines))
 
 
 def true_age_s(other: OtherVehicle, at_mono_s: float) -> float:

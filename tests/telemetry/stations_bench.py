@@ -20,7 +20,7 @@ import numpy as np
 from telemetry.topics.station_vehicles import StationsStatus
 from tests.telemetry.bad_line import Bad, BadLine
 from tests.telemetry.bus_runs import short_folder
-from tests.telemetry.station_fleet import Field, FieldStation, true_age_s
+from tests.telemetry.station_fleet import Field, FieldStation, line_of, true_age_s
 
 ROUND_S = 2e-3
 
@@ -83,7 +83,8 @@ def _mixed_up(own: str, status: StationsStatus, names: list[str], vehicles: int)
     seen = [(other.station, other.it.number) for other in status.vehicles]
     meant = {(name, number) for name in names if name != own for number in range(1, vehicles + 1)}
     wrong_names = sum(other.it.name != f"Drone {other.it.number}" for other in status.vehicles)
-    return len(set(seen) ^ meant) + len(seen) - len(set(seen)) + wrong_names
+    wrong_lines = sum(line.packed != line_of(line.number) for line in status.lines)
+    return len(set(seen) ^ meant) + len(seen) - len(set(seen)) + wrong_names + wrong_lines
 
 
 def main() -> None:

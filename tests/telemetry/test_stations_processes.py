@@ -21,7 +21,7 @@ from telemetry.stations.station_names import vehicle_key
 from telemetry.topics.station_vehicles import FleetVehicle, StationsStatus
 from tests.telemetry.bad_line import Bad
 from tests.telemetry.bus_runs import PATIENCE_S, run, short_folder
-from tests.telemetry.station_fleet import Field, true_age_s
+from tests.telemetry.station_fleet import Field, line_of, true_age_s
 from tests.telemetry.stations_bench import ROUND_S, measure
 
 pytestmark = [pytest.mark.xdist_group("real-time"), pytest.mark.slow]
@@ -45,6 +45,11 @@ def test_three_stations_see_each_other_and_again_after_the_router_died() -> None
             await charlie.sees("Alpha", "Bravo")
             _ages_are_true(seen)
             assert seen.refused == 0
+            # And the line of each: asked for, and sent whole.
+            with_lines = await alpha.until(lambda status: len(status.lines) == 4)
+            assert {(line.station, line.number): line.packed for line in with_lines.lines} == {
+                (name, number): line_of(number) for name in ("Bravo", "Charlie") for number in (1, 2)
+            }
             # The router dies: both others are lost at once, with words; it comes back, and so do they.
             field.router.kill()
             lost = await alpha.until(lambda status: all(station.state == "lost" for station in status.stations))

@@ -22,7 +22,7 @@ from server.errors import StartError, error_doc
 from server.flying.apart.commanded_there import own_number
 from server.flying.apart.nearness import AHEAD_S, STANDS_M_S, STRAIGHT_S, VEER_SHARE, Flown
 from server.flying.apart.others_heard import NODE_SILENT_S, is_vague, name_of, row_of_others, with_missing
-from server.flying.apart.others_lines import OthersLines, ahead_of
+from server.flying.apart.others_lines import OthersLines, ahead_of, flies_along
 from server.heard.node_states import Nodes
 from server.heard.relay import Relay
 from server.schemas import CheckRow, ErrorDoc, OtherStationDoc, OtherVehicleDoc, StationsMessage
@@ -41,7 +41,10 @@ UNCOMPARED_S = 10.0
 FASTEST_M_S = 15.0
 """Of a vehicle that tells no velocity: so fast it may fly, anywhere."""
 TELL_EVERY_S, SHOW_EVERY_S, LOOK_FOR_FILE_S = 0.2, 0.5, 2.0
-_UNMET = "Other stations are neither seen nor told anything. Own vehicles are not affected."
+_UNMET = (
+    "Other stations are neither seen nor told anything until it can: it is tried again by itself. Own vehicles are not "
+    "affected."
+)
 _NODE_SILENT = (
     "The stations node does not answer: other stations are neither seen nor told anything. Own vehicles are not "
     "affected. It is started again by itself."
@@ -212,7 +215,7 @@ def counts(other: OtherVehicle, now_s: float) -> bool:
 def _flown(other: OtherVehicle, now_s: float, line: PlanLine | None) -> Flown:
     """It may be where it was told at the earliest of the times that are possible, or at the latest.
 
-    It is on ``line`` while its position is fresh, its age compared and its height known; else it flies straight on.
+    It is on ``line`` while it moves as that says, freshly seen, age and height known; else it flies straight on.
     From ``OLD_S`` on it may have flown elsewhere; after ``COUNTS_S`` it stands anywhere that it could reach until then.
     """
     it = other.it
@@ -243,7 +246,8 @@ def _flown(other: OtherVehicle, now_s: float, line: PlanLine | None) -> Flown:
         horizontal_accuracy_m=it.within_m,
     )
     key = f"{other.station} {it.number}"
-    left = None if line is None or it.line_s is None else ahead_of(line, it.line_s)
+    flies = line is not None and it.line_s is not None and flies_along(line, it.line_s, it.v_enu_m_s)
+    left = ahead_of(line, it.line_s) if flies and line is not None and it.line_s is not None else None
     if left is None or line is None or it.alt_amsl_m is None or other.oldest_t_mono_s is None or age > OLD_S:
         return Flown(name_of(other), state, None, unsure_m, is_silent, key)
     ahead, fastest_m_s = left

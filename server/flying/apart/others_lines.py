@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from mapping.geometry.arrays import F64
 from mapping.geometry.frames import MEAN_RADIUS_M
 from server.heard.plan_follower import Ahead
 from telemetry.errors import StationsError
 from telemetry.stations.plan_lines import PlanLine, line_id, unpacked
 from telemetry.topics.station_vehicles import OtherVehicle, StationsStatus
+
+_AGREES_M_S, _AROUND_S = 2.5, 3.0
+"""So near its velocity has to be to that of the line, at some time that is so near."""
+_SHORTEST_S = 0.1
 
 
 class OthersLines:
@@ -47,10 +52,24 @@ def ahead_of(line: PlanLine, line_s: float) -> tuple[Ahead, float] | None:
     return left, _fastest_m_s(line)
 
 
+def flies_along(line: PlanLine, line_s: float, v_enu_m_s: tuple[float, float, float] | None) -> bool:
+    """Whether it moves as the line says around that time: who stands on it, or crosses it, does not fly it now."""
+    if v_enu_m_s is None:
+        return False
+    steps_m, took_s = _steps(line)
+    near = (line.t_s[1:] >= line_s - _AROUND_S) & (line.t_s[:-1] <= line_s + _AROUND_S)
+    off_m_s = np.linalg.norm(steps_m[near] / took_s[near, None] - np.array(v_enu_m_s), axis=1)
+    return bool((off_m_s <= _AGREES_M_S).any())
+
+
+def _steps(line: PlanLine) -> tuple[F64, F64]:
+    """(N - 1, 3) east, north, up from point to point, and the seconds that they take."""
+    lat_rad, lon_rad = np.radians(line.lat_lon_deg).T
+    east_m = MEAN_RADIUS_M * np.cos(lat_rad[:-1]) * np.diff(lon_rad)
+    steps_m = np.column_stack([east_m, MEAN_RADIUS_M * np.diff(lat_rad), np.diff(line.alt_amsl_m)])
+    return steps_m, np.maximum(np.diff(line.t_s), _SHORTEST_S)
+
+
 def _fastest_m_s(line: PlanLine) -> float:
-    lat_rad = np.radians(line.lat_lon_deg[:, 0])
-    steps_m = MEAN_RADIUS_M * np.hypot(
-        np.diff(lat_rad), np.cos(lat_rad[:-1]) * np.diff(np.radians(line.lat_lon_deg[:, 1]))
-    )
-    took_s = np.maximum(np.diff(line.t_s), 0.1)
-    return float(np.max(np.hypot(steps_m, np.diff(line.alt_amsl_m)) / took_s, initial=0.0))
+    steps_m, took_s = _steps(line)
+    return float(np.max(np.linalg.norm(steps_m, axis=1) / took_s, initial=0.0))

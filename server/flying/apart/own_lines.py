@@ -23,8 +23,8 @@ log = logging.getLogger("hedgehop.flying")
 EVERY_S = 1.0
 GOOD_ENOUGH_M = 1.0
 """With fewer points no more is gained."""
-_HOME_STEP_M = 0.1
-"""By so much home has to move to make another line of the same plan."""
+_HOME_STEP_M = 0.5
+"""By so much home has to move to make another line of the same plan; less is part of the error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,10 @@ class OwnLines:
     async def run(self) -> None:
         """Until cancelled; a line that cannot be made is not told, and its vehicle is taken to fly straight on."""
         while True:
-            await self.look()
+            try:
+                await self.look()
+            except Exception as error:
+                log.warning("Lines for other stations: %s", reported(error, log, "Lines for other stations").what)
             await asyncio.sleep(EVERY_S)
 
     async def look(self) -> None:
@@ -105,4 +108,4 @@ def line_of_plan(followed: Followed, home_alt_amsl_m: float) -> PlanLine | None:
     # Straight on the map is not straight in latitude and longitude: by the bow between both, on the longest leg.
     steep = max(1.0, abs(math.tan(math.radians(float(np.abs(lat_lon_deg[:, 0]).max())))))
     bow_m = steep * longest_m**2 / (8.0 * MEAN_RADIUS_M)
-    return PlanLine(lat_lon_deg[kept], alt_amsl_m[kept], t_s[kept], off_m + bow_m)
+    return PlanLine(lat_lon_deg[kept], alt_amsl_m[kept], t_s[kept], off_m + bow_m + _HOME_STEP_M)
