@@ -58,11 +58,11 @@ const PHASES: Partial<Record<string, string>> = {
 
 /** Who commands it at its own station: whom to ask for by name when that one is called. */
 export function inCharge({ in_charge, in_charge_silent }: OtherVehicleDoc): string {
-  if (!in_charge) return "nobody is in charge";
-  return `${in_charge} is in charge${in_charge_silent ? ", not heard there" : ""}`;
+  if (!in_charge) return "nobody in charge";
+  return `${in_charge} in charge${in_charge_silent ? ", not heard there" : ""}`;
 }
 
-/** Age and height first: what is old says little else. */
+/** Age and height first: what is old says little else. What is cut off in a narrow row the pointer shows. */
 export function words(vehicle: OtherVehicleDoc): string {
   const { ground_speed_m_s, mode, armed, phase, battery_share } = vehicle;
   const speed = ground_speed_m_s === null ? "" : withUnit(ground_speed_m_s, "m/s", 1);
@@ -70,12 +70,12 @@ export function words(vehicle: OtherVehicleDoc): string {
   return [
     age(vehicle),
     height(vehicle),
+    inCharge(vehicle),
     speed,
     mode,
     armed ? "armed" : "disarmed",
     PHASES[phase] ?? "",
     battery,
-    inCharge(vehicle),
   ]
     .filter(Boolean)
     .join(" · ");
