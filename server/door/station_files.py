@@ -6,6 +6,7 @@ station's certificate is good for showing who it is and for nothing else: no bro
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -13,7 +14,7 @@ from pathlib import Path
 
 from planning.errors import DescribedError
 from server.door.certificates import CertificateFiles, Names, read_certificate, read_common_name
-from server.errors import StartError
+from server.errors import CertificateError, StartError
 from server.library.whole_files import storage_errors, write_atomically
 from telemetry.errors import StationsError
 from telemetry.stations.router_file import router_file
@@ -84,19 +85,35 @@ def write_station_files(
 def station_of(path: Path) -> str:
     """The name in a station's file. Raises StartError."""
     try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise StationsError("It is not a regular file.")
         if len(_parts(path.read_text(encoding="ascii"))) != 3:
             raise StationsError("It must hold a key, the station's certificate and the authority's.")
-        return checked_name(read_common_name(path))
+        return checked_name(_name_in(path))
     except (OSError, ValueError, DescribedError) as error:
-        if isinstance(error, DescribedError):
-            why = error.what
-        else:
-            why = getattr(error, "strerror", None) or str(error)
+        why = _why(error)
         raise StartError(
             f"The station's file cannot be used: {why.rstrip('.')}.",
             where=f"{path} (setting stations_file)",
             advice="Make it with hedgehop stations, and name it as a path that this user may read.",
         ) from error
+
+
+def _name_in(path: Path) -> str:
+    try:
+        return read_common_name(path)
+    except CertificateError as error:
+        if isinstance(error.__cause__, OSError):
+            raise error.__cause__ from None
+        raise StationsError("Its certificate is damaged") from error
+
+
+def _why(error: Exception) -> str:
+    if isinstance(error, DescribedError):
+        return error.what
+    if isinstance(error, UnicodeDecodeError):
+        return "It holds something else than keys and certificates"
+    return getattr(error, "strerror", None) or "Its name is no path"
 
 
 def _is_of(path: Path, authority_pem: str) -> bool:

@@ -166,9 +166,12 @@ class Follower:
         return self._followed
 
     def line_s(self, flight: FlightStatus) -> float | None:
-        """Where on the plan's line it is, by the line's own times; None where it does not fly that, or is beside it."""
+        """Where on the plan's line it is, by the line's own times; None where the autopilot does not fly that as its
+        mission, or has not come to it yet, or is beside it."""
         followed, at = self._followed, self._following.at
-        if followed is None or at is None or not self._following.begun or flight.phase != "flying":
+        if followed is None or at is None or not self._following.begun:
+            return None
+        if (flight.way, flight.phase) != ("auto", "flying"):
             return None
         if math.hypot(at.cross_track_m, at.height_error_m) > OFF_LINE_M:
             return None

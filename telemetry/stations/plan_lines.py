@@ -21,6 +21,8 @@ from telemetry.stations.station_messages import decode
 MOST_POINTS, LINE_BYTES = 128, 4096
 ROUNDED_M = 0.1
 """Added to the error: positions to 1e-7 degree, heights to a centimetre, times to a millisecond at up to 60 m/s."""
+MOST_ERROR_M = 15.0
+"""A line that may be more wrong is neither told nor used."""
 Meta = msgspec.Meta
 _Step = Annotated[int, Meta(ge=-1_000_000_000, le=1_000_000_000)]
 _StepUp = Annotated[int, Meta(ge=-10_000_000, le=10_000_000)]

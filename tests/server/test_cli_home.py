@@ -168,6 +168,17 @@ def test_what_is_no_place_is_refused_before_anything_is_asked(served: Running, d
     assert run.json["error"]["where"] == "here|LAT,LON"
 
 
+@pytest.mark.parametrize(
+    "vehicle", ["", " ", "0", "01", "Bee", "-1", "Bravo 1", "Bravo/", "/1", "1\n", "1\r\nX: y", "\u0661"]
+)
+def test_what_names_no_vehicle_is_refused_before_anything_is_sent(served: Running, desk: Desk, vehicle: str) -> None:
+    done = home(served, "here", f"--vehicle={vehicle}")
+    assert done.code == 2, done.err
+    assert "names no vehicle: nothing was sent." in done.err
+    assert "--vehicle Alpha/2" in done.err
+    assert desk.asked == []
+
+
 def test_a_station_that_cannot_be_reached_or_answers_nonsense(served: Running, desk: Desk) -> None:
     gone = StationSession(f"http://127.0.0.1:{free_port()}", None)
     with pytest.raises(StationError, match="cannot be reached"):

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from server.errors import OtherStationError, status_of
+from server.errors import BadRequestError, OtherStationError, status_of
 from server.flying.apart.commanded_there import own_number
 from server.flying.apart.others_heard import NODE_SILENT_S
 from telemetry.topics.station_vehicles import OtherStation, StationsStatus
@@ -68,3 +68,14 @@ def test_ones_own_may_be_named_with_its_station_and_a_number_alone_is_ones_own()
     assert own_number("Alpha/2", "Alpha", HEARD, NOW_S) == "2"
     for words in ("1", "", "2 ", "Bravo", "Bravo/", "Bravo/0", "Bravo/01", "Bravo/1/2", "../1", "Bravo/\u0661", "-1"):
         assert own_number(words, "Alpha", HEARD, NOW_S) is None
+
+
+def test_while_its_own_name_is_not_known_only_a_number_is_ones_own() -> None:
+    for words, status in (("Alpha/1", HEARD), ("Delta/1", None)):
+        with pytest.raises(BadRequestError, match="own name is not known") as refused:
+            own_number(words, "", status, NOW_S)
+        assert status_of(refused.value) == 422
+        assert refused.value.advice == "Name one of its vehicles by the number alone."
+    assert own_number("1", "", HEARD, NOW_S) is None
+    with pytest.raises(OtherStationError, match="commanded by Bravo alone"):
+        own_number("Bravo/1", "", HEARD, NOW_S)

@@ -33,7 +33,7 @@ from server.flying.apart.own_told import fleet_vehicle
 from server.heard.plan_follower import Ahead
 from server.schemas import StationsMessage, VehicleAlarm, VehicleDoc
 from server.stations import Other
-from telemetry.topics.messages import LinkStatus
+from telemetry.topics.messages import FlightStatus, LinkStatus
 from telemetry.topics.station_vehicles import FleetVehicle, OtherStation, OtherVehicle, StationsStatus
 from telemetry.topics.vehicle import VehicleState
 
@@ -370,12 +370,14 @@ def test_own_vehicles_are_told_as_they_are_known() -> None:
         v_north_m_s=3.0, v_east_m_s=4.0, v_down_m_s=-1.0,
     )  # fmt: skip
     follow = SimpleNamespace(progress=0.4, height_above_dsm_m=12.0)
-    channel: Any = SimpleNamespace(state=state, follow=follow, in_air=True, battery="63 %")
+    channel: Any = SimpleNamespace(state=state, follow=follow, in_air=True, battery="63 %", flight=FlightStatus("auto"))
     told = fleet_vehicle(doc, channel, LinkStatus(0.0, quality=0.9), in_charge_silent=True)
     assert (told.in_charge, told.in_charge_silent, told.phase) == ("Anna", True, "flying")
     assert (told.plan, told.plan_share, told.alt_surface_m, told.battery) == ("Ridge", 0.4, 12.0, "63 %")
     assert told.v_enu_m_s == (4.0, 3.0, 1.0)
     assert (told.link_quality, told.alarm, told.position_t_mono_s) == (0.9, "Lost.", 9.0)
+    channel.flight = FlightStatus("guided", "flying")
+    assert fleet_vehicle(doc, channel, None).plan == ""
     channel.in_air, channel.state = False, replace(state, v_down_m_s=None)
     told = fleet_vehicle(doc, channel, None)
     assert (told.plan, told.plan_share, told.v_enu_m_s) == ("", None, None)

@@ -9,24 +9,23 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from mapping.geometry.frames import moved_deg, offset_m
 from planning.following.reference import Reference
-from server.flying.apart.nearness import NEAR_M, Flown
-from server.flying.apart.other_stations import OLD_S
-from server.flying.apart.other_vehicles import Other, OtherVehicles, meets_elsewhere
+from server.flying.apart import own_lines
+from server.flying.apart.nearness import NEAR_M, Flown, near_each_other
+from server.flying.apart.other_stations import OLD_S as POSITION_OLD_S
 from server.flying.apart.others_lines import OthersLines
 from server.flying.apart.others_placed import placed_vehicles
 from server.flying.apart.own_lines import OwnLines, line_of_plan
 from server.heard.plan_follower import NO_FLIGHT, OFF_LINE_M, Follower
 from server.scene.layers.other_stations_layer import other_vehicle_nodes
-from telemetry.stations.plan_lines import MOST_POINTS, PlanLine, line_id, packed, unpacked
+from telemetry.stations.plan_lines import MOST_ERROR_M, MOST_POINTS, PlanLine, line_id, packed, unpacked
 from telemetry.topics.messages import FlightStatus
 from telemetry.topics.station_vehicles import FleetLine, OtherVehicle
 from telemetry.topics.vehicle import VehicleState
-from tests.server.test_flying_apart_other_vehicles import EAST, flying, standing
-from tests.server.test_flying_apart_other_vehicles import HOME_ALT_M as OWN_HOME_M
-from tests.server.test_flying_apart_other_vehicles import NOW_S as THEN_S
 from tests.server.test_other_stations import HOME, NOW_S, Desk, other
 from tests.server.test_scene_obstacles import placed
 
@@ -55,15 +54,57 @@ def on(payload: bytes, east_m: float = 100.0, line_s: float | None = 0.0, **more
     return other(east_m, line=line_id(payload), line_s=line_s, **{"east_m_s": -10.0, "age_s": 0.0, **more})
 
 
-def test_one_that_turns_away_on_its_line_is_not_taken_to_fly_straight_on() -> None:
-    assert near_m(on(AWAY), None) == 0.0
-    assert 45.0 < near_m(on(AWAY), AWAY) < 65.0
+def along_m(told: OtherVehicle, payload: bytes) -> float | None:
+    """As it is judged on its line alone; None: it is not."""
+    desk = Desk()
+    desk.tell(told, lines=(FleetLine("Bravo", 1, payload),))
+    (flown,) = desk.it.flown(NOW_S)
+    hovers = VehicleState(1, 1, armed=True, position_t_mono_s=NOW_S, lat_deg=HOME[0], lon_deg=HOME[1])
+    found = flown.told and near_each_other(Flown("Bee", replace(hovers, alt_amsl_m=500.0), None), flown.told, NOW_S)
+    return None if found is None else found.distance_m
+
+
+def test_one_that_turns_away_on_its_line_may_fly_straight_on() -> None:
+    assert near_m(on(AWAY), AWAY) == near_m(on(AWAY), None) == 0.0
+    away_m = along_m(on(AWAY), AWAY)
+    assert away_m is not None
+    assert 45.0 < away_m < 65.0
     # Where it was a second ago, it is a second on by now.
-    assert near_m(on(AWAY, 100.0, age_s=1.0), AWAY) == pytest.approx(near_m(on(AWAY), AWAY), abs=3.0)
+    assert along_m(on(AWAY, 100.0, age_s=1.0), AWAY) == pytest.approx(away_m, abs=3.0)
     # Past its turn, north of here: what lies behind it counts no more.
     lat_deg, lon_deg = moved_deg(HOME, 70.0, 200.0)
     past = on(AWAY, lat_deg=lat_deg, lon_deg=lon_deg, line_s=23.0, v_enu_m_s=(0.0, 10.0, 0.0))
     assert near_m(past, AWAY) > 180.0
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    st.floats(-200.0, 200.0), st.floats(-14.0, 14.0), st.tuples(*[st.floats(-12.0, 12.0)] * 3),
+    st.floats(0.0, 30.0), st.floats(0.0, 4.0), st.lists(st.tuples(*[st.floats(-150.0, 150.0)] * 2), max_size=4),
+)  # fmt: skip
+def test_a_line_only_ever_adds_whatever_it_says(
+    east_m: float, off_m: float, v_enu_m_s: tuple[float, float, float], line_s: float, age_s: float, turns: list[Any]
+) -> None:
+    """What stands in AUTO, waits at a waypoint, drifts off or flies on behind its line's end is judged straight on."""
+    points = [(east_m, 0.0, 0.0), (east_m, 0.0, 15.0)]
+    points += [(e_m, n_m, 25.0 + 10.0 * k) for k, (e_m, n_m) in enumerate(turns)]
+    payload = line(*points, alt_amsl_m=500.0 + off_m)
+    told = on(payload, east_m, line_s, v_enu_m_s=v_enu_m_s, age_s=age_s)
+    assert near_m(told, payload) <= near_m(told, None)
+
+
+def test_of_a_line_on_which_it_is_not_nothing_is_taken() -> None:
+    """A home that is told wrong, or a line elsewhere, whatever place on it is said to be its."""
+    off_m = OFF_LINE_M + unpacked(AWAY).error_m
+    assert along_m(on(AWAY, alt_amsl_m=500.0 + off_m - 0.1), AWAY) is not None
+    for odd in (on(AWAY, alt_amsl_m=500.0 + off_m + 0.1), on(AWAY, 100.0 + off_m + 0.2), on(AWAY, line_s=20.0)):
+        assert along_m(odd, AWAY) is None
+        assert near_m(odd, AWAY) == near_m(odd, None)
+
+
+def test_a_line_that_is_too_wrong_is_not_used() -> None:
+    lines = [line((100, 0, 0), (70, 0, 3), (70, 400, 43), error_m=error_m) for error_m in (14.8, 15.1)]
+    assert [along_m(on(each), each) is not None for each in lines] == [True, False]
 
 
 def test_one_that_turns_towards_ours_later_is_an_alarm_now() -> None:
@@ -74,10 +115,13 @@ def test_one_that_turns_towards_ours_later_is_an_alarm_now() -> None:
 
 
 def test_what_its_line_may_be_wrong_by_is_added() -> None:
-    exact_m = near_m(on(AWAY), AWAY)
-    rough = line((100, 0, 0), (70, 0, 3), (70, 400, 43), error_m=20.0)
-    assert near_m(on(rough), rough) == pytest.approx(exact_m - 20.0, abs=0.5)
-    assert near_m(on(AWAY, unsure_s=1.0), AWAY) <= exact_m - 9.0
+    exact_m = along_m(on(AWAY), AWAY)
+    assert exact_m is not None
+    rough = line((100, 0, 0), (70, 0, 3), (70, 400, 43), error_m=10.0)
+    assert along_m(on(rough), rough) == pytest.approx(exact_m - 2 * 10.0, abs=0.5)
+    # And how far it is beside the line now.
+    assert along_m(on(AWAY, alt_amsl_m=512.0), AWAY) == pytest.approx(exact_m - 12.0, abs=2.0)
+    assert (along_m(on(AWAY, unsure_s=1.0), AWAY) or 0.0) <= exact_m - 9.0
 
 
 @pytest.mark.parametrize(
@@ -87,16 +131,14 @@ def test_what_its_line_may_be_wrong_by_is_added() -> None:
         pytest.param(on(AWAY, line_s=43.5), id="it is over"),
         pytest.param(on(HERE_LATER), id="it flies another one"),
         pytest.param(other(100.0, east_m_s=-10.0, age_s=0.0), id="it tells of none"),
-        pytest.param(on(AWAY, age_s=OLD_S + 0.1), id="its position is old"),
+        pytest.param(on(AWAY, age_s=POSITION_OLD_S + 0.1), id="its position is old"),
         pytest.param(on(AWAY, age_s=None), id="the clocks are not compared"),
         pytest.param(on(AWAY, alt_amsl_m=None), id="its height is not known"),
         pytest.param(on(AWAY, age_s=100.0), id="it is not heard any more"),
-        pytest.param(on(AWAY, east_m_s=0.0), id="it stands on its line"),
-        pytest.param(on(AWAY, v_enu_m_s=(0.0, -10.0, 0.0)), id="it crosses its line"),
-        pytest.param(on(AWAY, east_m_s=None), id="it tells no velocity"),
     ],
 )
 def test_else_it_flies_straight_on_as_without_a_line(odd: OtherVehicle) -> None:
+    assert along_m(odd, AWAY) is None
     assert near_m(odd, AWAY) == near_m(odd, None)
 
 
@@ -108,43 +150,6 @@ def test_lines_are_forgotten_with_what_tells_them_and_odd_ones_left_out() -> Non
     assert lines.of(told.vehicles[0]) is not None
     lines.on_status(replace(told, lines=()))
     assert lines.of(told.vehicles[0]) is None
-
-
-def elsewhere(plan: Any = EAST, *, gone_s: float = 30.0) -> Flown:
-    """Another station's, in the air on a line of which heights count above the sea."""
-    flown = flying(plan, gone_s).flown
-    assert flown.ahead is not None
-    ahead = replace(flown.ahead, alt_rel_home_m=flown.ahead.alt_rel_home_m + OWN_HOME_M)
-    return Flown("Wasp (Bravo 1)", replace(flown.state, home_alt_amsl_m=0.0), ahead, key="Bravo 1")
-
-
-def test_a_start_that_would_meet_it_by_the_predicted_times_is_refused() -> None:
-    mine = standing(EAST)
-    row = meets_elsewhere(mine, [elsewhere(gone_s=11.0)], THEN_S)
-    assert row is not None
-    assert (row.state, row.code) == ("bad", "others")
-    assert row.text.startswith("Started now, it may come within 0 m of Wasp (Bravo 1) in ")
-    assert row.mend == "Start later, and call the other station."
-    # High above, or without a line, it says nothing; and nothing of that makes it good.
-    high = elsewhere(gone_s=11.0)
-    assert high.ahead is not None
-    high = replace(high, ahead=replace(high.ahead, alt_rel_home_m=high.ahead.alt_rel_home_m + 300.0))
-    high = replace(high, state=replace(high.state, alt_amsl_m=OWN_HOME_M + 320.0))
-    for flown in (high, replace(elsewhere(), ahead=None)):
-        assert meets_elsewhere(mine, [flown], THEN_S) is None
-    assert meets_elsewhere(replace(mine, on_board=None), [elsewhere()], THEN_S) is None
-    told, desk = list[Any](), Desk(on(AWAY))
-    rows = OtherVehicles(
-        {1: lambda: mine},
-        {1: told.append},
-        elsewhere=desk.it.row,
-        flown_elsewhere=lambda now_s: [elsewhere(gone_s=11.0)],
-        now_mono_s=lambda: THEN_S,
-    )
-    asyncio.run(rows.look())
-    rows._flown_elsewhere = lambda now_s: [high]
-    asyncio.run(rows.look())
-    assert [row.state for row in told] == ["bad", "accept"]
 
 
 # Told by this station
@@ -195,6 +200,26 @@ def test_a_plan_without_times_is_not_told() -> None:
     assert line_of_plan(SimpleNamespace(reference=plan, placer=followed.placer), 480.0) is None  # type: ignore[arg-type]
 
 
+def test_a_line_that_would_be_too_wrong_is_not_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    followed = reference(30)
+    made = line_of_plan(followed, 480.0)
+    assert made is not None
+    channel: Any = SimpleNamespace(
+        state=VehicleState(1, 1, home_alt_amsl_m=480.0),
+        follower=SimpleNamespace(followed=followed, line_s=lambda flight: 12.5),
+        flight=FLYING,
+        in_air=True,
+    )
+    for error_m, count in ((MOST_ERROR_M - 0.2, 1), (MOST_ERROR_M - 0.1, 0)):
+        rough = replace(made, error_m=error_m)
+        monkeypatch.setattr(own_lines, "line_of_plan", lambda *_, rough=rough: rough)
+        lines = OwnLines({2: channel})
+        asyncio.run(lines.look())
+        assert len(lines.lines()) == count
+        assert (lines.told(2)[0] != 0) == bool(count)
+    assert unpacked(packed(replace(made, error_m=MOST_ERROR_M - 0.2))).error_m <= MOST_ERROR_M
+
+
 def test_a_line_is_told_in_the_air_and_only_of_the_plan_that_is_followed() -> None:
     followed = reference(30)
     follower = SimpleNamespace(followed=followed, line_s=lambda flight: 12.5)
@@ -238,6 +263,9 @@ def test_one_that_left_its_line_is_not_told_to_fly_it(
     follower._following = SimpleNamespace(at=at, begun=True)
     plan = follower.followed.reference
     told_s = follower.line_s(FlightStatus("auto", phase))
+    assert follower.line_s(FlightStatus("guided", phase)) is None
+    follower._following.begun = False
+    assert follower.line_s(FlightStatus("auto", phase)) is None
     assert (told_s is not None) == is_told
     if told_s is not None:
         assert told_s == pytest.approx((plan.leave_s[3] + plan.arrive_s[4]) / 2)
@@ -258,18 +286,3 @@ def test_what_is_left_of_its_line_is_drawn_while_it_is_on_it() -> None:
     (old,) = placed_vehicles([here], drawing.dsm, NOW_S + 8.0, lambda _: told)
     (none,) = placed_vehicles([here], drawing.dsm, NOW_S)
     assert (old.line_m, none.line_m) == (None, None)
-
-
-def test_own_and_others_are_not_mixed_up_in_the_check() -> None:
-    """A line that meets nothing of ours leaves the row as it was: what flies on after its line's end is not known."""
-    far = standing(EAST)
-    assert isinstance(far, Other)
-    lat_deg, lon_deg = moved_deg(HOME, 0.0, 50_000.0)
-    away = elsewhere()
-    assert away.ahead is not None
-    away = replace(
-        away,
-        state=replace(away.state, lat_deg=lat_deg, lon_deg=lon_deg),
-        ahead=replace(away.ahead, lat_lon_deg=away.ahead.lat_lon_deg + np.array([0.45, 0.0])),
-    )
-    assert meets_elsewhere(far, [away], THEN_S) is None

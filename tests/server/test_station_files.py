@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import stat
 from datetime import timedelta
 from pathlib import Path
@@ -131,6 +132,38 @@ def test_a_file_that_is_no_stations_stops_the_start_with_words(tmp_path: Path) -
             station_of(tmp_path / "odd.pem")
     with pytest.raises(StartError, match="station's file"):
         station_of(tmp_path / "none.pem")
+
+
+PARTS = (
+    "-----BEGIN PRIVATE KEY-----\nAAAA\n-----END PRIVATE KEY-----\n",
+    "-----BEGIN CERTIFICATE-----\n{}\n-----END CERTIFICATE-----\n",
+)
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        (PARTS[0] + 2 * PARTS[1].format("AAAA"), "Its certificate is damaged"),
+        (PARTS[0] + 2 * PARTS[1].format("!!!"), "Its certificate is damaged"),
+        (PARTS[0] + 2 * PARTS[1].format("MIIB"), "Its certificate is damaged"),
+        ("ä", "It holds something else than keys and certificates"),
+        ("", "It must hold a key, the station's certificate and the authority's"),
+    ],
+)
+def test_what_is_wrong_with_its_file_is_told_in_plain_words(tmp_path: Path, content: str, why: str) -> None:
+    (tmp_path / "Alpha.pem").write_text(content)
+    with pytest.raises(StartError) as odd:
+        station_of(tmp_path / "Alpha.pem")
+    assert odd.value.what == f"The station's file cannot be used: {why}."
+
+
+def test_a_pipe_or_a_folder_in_the_files_place_is_refused_and_nobody_waits_for_it(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for path in (tmp_path / "pipe", tmp_path):
+        with pytest.raises(StartError, match="It is not a regular file"):
+            station_of(path)
+    with pytest.raises(StartError, match="Its name is no path"):
+        station_of(Path("/x\0y"))
 
 
 def test_settings_are_set_both_or_neither(tmp_path: Path) -> None:

@@ -53,7 +53,7 @@ beforeEach(() => {
 describe("other stations' vehicles", () => {
   test("age and height come first, each with its unit and from where it counts", () => {
     expect(words(bee)).toBe(
-      "0.4\u00a0s old · 12\u00a0m above ground · Anna in charge · 5.3\u00a0m/s · AUTO · armed · flies its plan · 63 %",
+      "0.4\u00a0s old · 12\u00a0m above ground · Anna in charge · 5.3\u00a0m/s · AUTO · armed · under way · 63 %",
     );
     expect(words({ ...bee, alt_surface_m: null })).toContain("30\u00a0m above its home");
     expect(words({ ...bee, alt_surface_m: null, alt_rel_home_m: null })).toContain("530\u00a0m AMSL");

@@ -89,7 +89,7 @@ def goto(
     dsm: Annotated[
         Path | None, Option(metavar="FILE", help="Surface model that is flown over: GeoTIFF or ESRI ASCII grid.")
     ] = None,
-    vehicle: Annotated[str | None, Option(help="Number of the vehicle, where a station has several.")] = None,
+    vehicle: o.StationVehicle = None,
     check: Annotated[bool, Option("--check", help="Judge the way and say it; do not fly it.")] = False,
     accept_return: Annotated[
         bool, Option("--accept-return", help="Fly although the vehicle's own return from the way would not be clear.")

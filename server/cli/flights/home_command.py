@@ -28,7 +28,7 @@ def home(
     accept_return: Annotated[
         bool, Option("--accept-return", help="Set it although the vehicle's return to it is not certified.")
     ] = False,
-    vehicle: Annotated[str | None, Option(help="Number of the vehicle, where the station has several.")] = None,
+    vehicle: o.StationVehicle = None,
     data_dir: Annotated[
         Path | None, Option(help="That the station was started with; default: the user's data home.")
     ] = None,

@@ -7,6 +7,7 @@ from __future__ import annotations
 import contextlib
 import http.client
 import json
+import re
 import ssl
 import time
 from collections.abc import Callable, Iterator
@@ -31,6 +32,7 @@ Doc = TypeVar("Doc", bound=BaseModel)
 ASK_S, LOOK_EVERY_S = 20.0, 1.0
 """``ASK_S``: for a request that only looks or signs in or out."""
 LINK_LASTS_S = 60.0
+_VEHICLE = re.compile(r"(?:[A-Za-z0-9][A-Za-z0-9_-]{0,23}/)?[1-9][0-9]{0,2}", re.ASCII)
 NOT_IN_CHARGE = "Nothing was asked of the vehicle."
 
 
@@ -130,8 +132,9 @@ class StationSession:
 
 @contextmanager
 def station_session(data_dir: Path | None, vehicle: str | None) -> Iterator[StationSession]:
-    """With the station that runs from ``data_dir`` (None: the settings'). Raises BadRequestError where there is none,
-    StationError, StorageError."""
+    """With the station that runs from ``data_dir`` (None: the settings'). Raises BadRequestError where there is none or
+    ``vehicle`` names none, StationError, StorageError."""
+    _check_names(vehicle)
     settings = load_settings(data_dir=data_dir)
     _check_runs(settings.data_dir)
     file = origin_file(settings)
@@ -147,6 +150,15 @@ def station_session(data_dir: Path | None, vehicle: str | None) -> Iterator[Stat
 def station_runs(data_dir: Path | None) -> bool:
     """From ``data_dir`` (None: the settings')."""
     return _is_held(load_settings(data_dir=data_dir).data_dir)
+
+
+def _check_names(vehicle: str | None) -> None:
+    """Before anything is sent: what names no vehicle would be about the station's only one, or no header at all."""
+    if vehicle is None or _VEHICLE.fullmatch(vehicle):
+        return
+    what = f"{vehicle[:40]!a} names no vehicle: nothing was sent."
+    advice = "Say its number, as in --vehicle 2, or station and number, as in --vehicle Alpha/2."
+    raise BadRequestError(what, where="--vehicle", advice=advice)
 
 
 def _is_held(data_dir: Path) -> bool:

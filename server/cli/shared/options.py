@@ -39,6 +39,13 @@ Keys = Annotated[
     Path | None,
     Option(metavar="DIR", help="Sign as the Hedgehop of this data directory does, and keep the log of commands there."),
 ]
+StationVehicle = Annotated[
+    str | None,
+    Option(
+        metavar="NUMBER|STATION/NUMBER",
+        help="Which vehicle, where the station has several: 2, or with the station's name Alpha/2.",
+    ),
+]
 Out = Annotated[Path, Option(metavar="DIR", help="Directory for the files.")]
 Cluster = Annotated[
     str | None,

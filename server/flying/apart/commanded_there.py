@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from server.errors import OtherStationError
+from server.errors import BadRequestError, OtherStationError
 from server.flying.apart.others_heard import NODE_SILENT_S, name_of
 from telemetry.topics.station_vehicles import OtherVehicle, StationsStatus
 
@@ -15,7 +15,8 @@ _NAMED = re.compile(r"([A-Za-z0-9][A-Za-z0-9_-]{0,23})[/ ]([1-9][0-9]?)", re.ASC
 def own_number(words: str, own: str, status: StationsStatus | None, now_s: float) -> str | None:
     """The number, where the station that is named is this one, ``own``; None: no station is named.
 
-    Raises OtherStationError: no command crosses from one station to another.
+    Raises OtherStationError: no command crosses from one station to another. BadRequestError while it is not known
+    which station this is (``own`` empty).
     """
     named = _NAMED.fullmatch(words)
     if named is None:
@@ -30,6 +31,11 @@ def own_number(words: str, own: str, status: StationsStatus | None, now_s: float
                 f"{name_of(other)} is commanded by {station} alone: nothing of this was done.",
                 advice=_whom_to_call(other, status, now_s),
             )
+    if not own:
+        raise BadRequestError(
+            "This station's own name is not known, because its file cannot be used: nothing of this was done.",
+            advice="Name one of its vehicles by the number alone.",
+        )
     knows = status is not None and any(each.name == station for each in status.stations)
     what = f"{station} tells of no vehicle {number}" if knows else f"No station {station} is heard here"
     raise OtherStationError(

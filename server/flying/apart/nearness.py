@@ -54,6 +54,8 @@ class Flown:
     """Of another station, and not heard for so long that nothing tells where it is by now."""
     key: str = ""
     """Of another station: its name and the vehicle's number there. What its vehicle is called may be anything."""
+    told: Flown | None = None
+    """Of another station: the same vehicle on the line that it is told to fly. Held apart as well, never instead."""
 
 
 Pair = tuple[int, int | str]
@@ -158,7 +160,7 @@ def found_among(flown: Mapping[int, Flown], now_s: float) -> dict[Pair, Nearest]
 
 def found_elsewhere(flown: Mapping[int, Flown], now_s: float, others: Mapping[str, Flown]) -> dict[Pair, Nearest]:
     """How near other stations' come to one's own; without those that are too far away for any alarm."""
-    reach_m = {key: _reach_m(of, now_s) for key, of in others.items()}
+    reach_m = {key: max(_reach_m(each, now_s) for each in _both_ways(of)) for key, of in others.items()}
     found: dict[Pair, Nearest] = {}
     for one, own in flown.items():
         own_m = _reach_m(own, now_s)
@@ -195,7 +197,19 @@ def _radius_m(of: Flown) -> float:
 
 
 def near_each_other(one: Flown, other: Flown, now_s: float) -> Nearest | None:
-    """Where either one's height above the sea is unknown, both are taken to be at the same height."""
+    """Where either one's height above the sea is unknown, both are taken to be at the same height.
+
+    Of another station's both ways count: straight on, and the line that is told; the nearer, then the sooner is it.
+    """
+    found = [at for way in _both_ways(other) if (at := _near_on(one, way, now_s)) is not None]
+    return min(found, key=lambda at: (at.distance_m, at.t_s), default=None)
+
+
+def _both_ways(of: Flown) -> tuple[Flown, ...]:
+    return (of,) if of.told is None else (of, of.told)
+
+
+def _near_on(one: Flown, other: Flown, now_s: float) -> Nearest | None:
     origin_deg = one.state.lat_deg or 0.0, one.state.lon_deg or 0.0
     flat = one.state.alt_amsl_m is None or other.state.alt_amsl_m is None
     one_line, other_line = (line_of(each, origin_deg, now_s, flat=flat) for each in (one, other))

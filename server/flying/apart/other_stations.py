@@ -22,7 +22,7 @@ from server.errors import StartError, error_doc
 from server.flying.apart.commanded_there import own_number
 from server.flying.apart.nearness import AHEAD_S, STANDS_M_S, STRAIGHT_S, VEER_SHARE, Flown
 from server.flying.apart.others_heard import NODE_SILENT_S, is_vague, name_of, row_of_others, with_missing
-from server.flying.apart.others_lines import OthersLines, ahead_of, flies_along
+from server.flying.apart.others_lines import OthersLines, ahead_of, off_line_m
 from server.heard.node_states import Nodes
 from server.heard.relay import Relay
 from server.schemas import CheckRow, ErrorDoc, OtherStationDoc, OtherVehicleDoc, StationsMessage
@@ -44,6 +44,10 @@ TELL_EVERY_S, SHOW_EVERY_S, LOOK_FOR_FILE_S = 0.2, 0.5, 2.0
 _UNMET = (
     "Other stations are neither seen nor told anything until it can: it is tried again by itself. Own vehicles are not "
     "affected."
+)
+_STILL_MET = (
+    "The stations process of an earlier start still runs, as {name}: others are seen and told by it. Once it ends it "
+    "is not started again until the file can be used, which is tried by itself. Own vehicles are not affected."
 )
 _NODE_SILENT = (
     "The stations node does not answer: other stations are neither seen nor told anything. Own vehicles are not "
@@ -101,7 +105,9 @@ class OtherStations:
         await self._nodes.stations(self._name, meeting.routers, meeting.file)
 
     def _on_fault(self, error: ErrorDoc, alarms: Alarms) -> None:
-        fault = f"{error.what} {_UNMET}"
+        status = self.status
+        is_met = status is not None and self._now_mono_s() - status.t_mono_s <= NODE_SILENT_S
+        fault = f"{error.what} {_STILL_MET.format(name=status.station) if status is not None and is_met else _UNMET}"
         if fault != self._fault:
             self._fault = fault
             log.warning("%s (%s) %s", fault, error.where, error.advice)
@@ -215,7 +221,7 @@ def counts(other: OtherVehicle, now_s: float) -> bool:
 def _flown(other: OtherVehicle, now_s: float, line: PlanLine | None) -> Flown:
     """It may be where it was told at the earliest of the times that are possible, or at the latest.
 
-    It is on ``line`` while it moves as that says, freshly seen, age and height known; else it flies straight on.
+    It flies straight on; and, judged as well, along ``line`` while it is on that, freshly seen and its age known.
     From ``OLD_S`` on it may have flown elsewhere; after ``COUNTS_S`` it stands anywhere that it could reach until then.
     """
     it = other.it
@@ -246,14 +252,23 @@ def _flown(other: OtherVehicle, now_s: float, line: PlanLine | None) -> Flown:
         horizontal_accuracy_m=it.within_m,
     )
     key = f"{other.station} {it.number}"
-    flies = line is not None and it.line_s is not None and flies_along(line, it.line_s, it.v_enu_m_s)
-    left = ahead_of(line, it.line_s) if flies and line is not None and it.line_s is not None else None
-    if left is None or line is None or it.alt_amsl_m is None or other.oldest_t_mono_s is None or age > OLD_S:
-        return Flown(name_of(other), state, None, unsure_m, is_silent, key)
+    straight = Flown(name_of(other), state, None, unsure_m, is_silent, key)
+    if line is None or other.oldest_t_mono_s is None or age > OLD_S:
+        return straight
+    return replace(straight, told=_on_line(straight, it, line, unsure_s))
+
+
+def _on_line(straight: Flown, it: FleetVehicle, line: PlanLine, unsure_s: float) -> Flown | None:
+    """None: it is not on it, or nothing of it is left. What it is off its line, and twice what that may be wrong by (at
+    its place, and ahead), is added to its ball."""
+    off_m = off_line_m(line, it)
+    left = None if off_m is None or it.line_s is None else ahead_of(line, it.line_s)
+    if off_m is None or left is None:
+        return None
     ahead, fastest_m_s = left
+    unsure_m = off_m + 2.0 * line.error_m + fastest_m_s * unsure_s
     # Heights on the line count above the sea, as if its home stood there.
-    state = replace(state, home_alt_amsl_m=0.0)
-    return Flown(name_of(other), state, ahead, line.error_m + fastest_m_s * unsure_s, is_silent, key)
+    return replace(straight, state=replace(straight.state, home_alt_amsl_m=0.0), ahead=ahead, unsure_m=unsure_m)
 
 
 def _doc(other: OtherVehicle, now_s: float) -> OtherVehicleDoc:

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +37,10 @@ from telemetry.topics.vehicle import VehicleState
 log = logging.getLogger("hedgehop.flying")
 
 EVERY_S = 1.0
+OLD_S = 5.0
+"""What was looked at before that counts no more."""
+HORIZON_S, MOST_LINES = 600.0, 8
+"""So far, and against so many lines of other stations' vehicles, a mission is held."""
 LONG_S = 1800.0
 """Half of this is longer than anything here flies home."""
 _HOME_POINTS = 4
@@ -59,6 +65,25 @@ class Other:
     """It holds, and what is on board was taken up and is not flown yet."""
 
 
+@dataclass(frozen=True, slots=True)
+class _Met:
+    """What the look along the lines of others found for a mission."""
+
+    on_board: Whole
+    row: CheckRow
+    t_mono_s: float
+
+    def is_of(self, on_board: Whole | None) -> bool:
+        mine = self.on_board
+        return on_board is not None and all(
+            np.array_equal(one, other)
+            for one, other in (
+                (mine.lat_lon_deg, on_board.lat_lon_deg),
+                (mine.alt_rel_home_m, on_board.alt_rel_home_m),
+            )
+        )
+
+
 def known(name: str, channel: Channel, *, is_verified: bool, waits_in_air: bool = False) -> Other:
     state, follower = channel.state, channel.follower
     flown = Flown(name, state or VehicleState(0, 0), follower.ahead(channel.flight))
@@ -79,66 +104,122 @@ class OtherVehicles:
         elsewhere: Callable[[], CheckRow | None] = lambda: None,
         flown_elsewhere: Callable[[float], Sequence[Flown]] = lambda _: (),
         now_mono_s: Callable[[], float] = time.monotonic,
+        old_s: float = OLD_S,
     ) -> None:
         """``look`` and ``tell`` by the vehicle's number; ``elsewhere``: what other stations make of it;
         ``flown_elsewhere``: their vehicles in the air."""
         self._look, self._tell, self._elsewhere, self._now_mono_s = look, tell, elsewhere, now_mono_s
-        self._flown_elsewhere = flown_elsewhere
+        self._flown_elsewhere, self._old_s = flown_elsewhere, old_s
+        self._met: dict[int, _Met] = {}
 
     async def run(self) -> None:
         """Until cancelled."""
-        while True:
-            try:
-                await self.look()
-            except Exception as error:
-                log.warning("A mission against those of others: %s", reported(error, log, "Comparing missions").what)
-                for tell in self._tell.values():
-                    tell(PENDING)
-            await asyncio.sleep(EVERY_S)
+        await asyncio.gather(self._again(self.look, self._tell_pending), self._again(self.look_along, self._met.clear))
 
     async def look(self) -> None:
+        """What is quickly known, and what the last look along the lines of others found."""
         seen = {number: look() for number, look in self._look.items()}
-        elsewhere, flown = self._elsewhere(), self._flown_elsewhere(self._now_mono_s())
-        for number, row in (await asyncio.to_thread(self._rows, seen, elsewhere, flown)).items():
-            self._tell[number](row)
+        work = asyncio.ensure_future(asyncio.to_thread(self._rows, seen, self._elsewhere(), dict(self._met)))
+        done, _ = await asyncio.wait({work}, timeout=self._old_s)
+        if not done:
+            self._tell_pending()
+        rows = await work
+        if done:
+            for number, row in rows.items():
+                self._tell[number](row)
+
+    async def look_along(self) -> None:
+        """Takes as long as it takes: no row waits for it."""
+        seen, now_s = {number: look() for number, look in self._look.items()}, self._now_mono_s()
+        flown = self._flown_elsewhere(now_s)
+        for number, mine in seen.items():
+            waits = mine.on_board is not None and (not mine.flies or mine.waits_in_air)
+            met = await asyncio.to_thread(meets_elsewhere, mine, flown, now_s) if waits else None
+            self._met.pop(number, None)
+            if met is not None and mine.on_board is not None:
+                self._met[number] = _Met(mine.on_board, met, now_s)
+
+    async def _again(self, look: Callable[[], Coroutine[Any, Any, None]], or_else: Callable[[], None]) -> None:
+        while True:
+            try:
+                await look()
+            except Exception as error:
+                log.warning("A mission against those of others: %s", reported(error, log, "Comparing missions").what)
+                or_else()
+            await asyncio.sleep(EVERY_S)
+
+    def _tell_pending(self) -> None:
+        for tell in self._tell.values():
+            tell(PENDING)
 
     def _rows(
-        self, seen: Mapping[int, Other], elsewhere: CheckRow | None, flown: Sequence[Flown]
+        self, seen: Mapping[int, Other], elsewhere: CheckRow | None, met: Mapping[int, _Met]
     ) -> dict[int, CheckRow]:
         now_s, rows = self._now_mono_s(), {}
         for number, mine in seen.items():
             if not mine.flies or mine.waits_in_air:
                 row = row_against(mine, [other for key, other in seen.items() if key != number], now_s)
-                theirs = meets_elsewhere(mine, flown, now_s) or elsewhere
-                rows[number] = row if theirs is None else _together(row, theirs)
+                row = row if elsewhere is None else _together(row, elsewhere)
+                along = met.get(number)
+                is_of_this = along is not None and along.is_of(mine.on_board) and now_s - along.t_mono_s <= self._old_s
+                rows[number] = _together(row, along.row) if along is not None and is_of_this else row
         return rows
 
 
 def meets_elsewhere(mine: Other, flown: Sequence[Flown], now_s: float) -> CheckRow | None:
-    """Bad, where it would meet another station's vehicle on the line that this one flies, by the predicted times.
+    """To be accepted, where it would meet another station's vehicle on its told line, by the predicted times: the first
+    that is found, within ``HORIZON_S`` and of the ``MOST_LINES`` nearest vehicles whose lines may come near.
 
-    None says nothing: their way home is not told, nor what flies without a line.
+    Never bad: nobody here can hold that vehicle, or tell whether its line is true. None says nothing: their way home is
+    not told, nor what flies without a line.
     """
     if mine.on_board is None:
         return None
     origin_deg = float(mine.on_board.lat_lon_deg[0, 0]), float(mine.on_board.lat_lon_deg[0, 1])
-    found = list[tuple[Nearest, Flown]]()
-    for other in flown:
-        if other.ahead is None:
+    flat, looked_at, left_out = _home_alt_m(mine.flown.state) is None, 0, list[str]()
+    way_m = _way_m(mine.on_board, origin_deg, mine.flown.state, flat=flat)
+    parts = [_until(part, now_s + HORIZON_S) for part in _timed(mine.on_board, way_m, now_s)]
+    for other in sorted(flown, key=lambda each: _off_m(origin_deg, each)):
+        line = None if other.told is None else line_of(other.told, origin_deg, now_s, flat=flat, ahead_s=None)
+        line = None if line is None else _until(line, now_s + HORIZON_S)
+        if line is None or _boxes_apart_m(way_m, line.points_enu_m) >= NEAR_M + RADIUS_M + line.radius_m:
             continue
-        flat = _home_alt_m(mine.flown.state) is None
-        way_m = _way_m(mine.on_board, origin_deg, mine.flown.state, flat=flat)
-        line = line_of(other, origin_deg, now_s, flat=flat, ahead_s=None)
-        if ways_apart(way_m, line.points_enu_m, radius_m=max(RADIUS_M, line.radius_m)).distance_m >= NEAR_M:
+        looked_at += 1
+        if looked_at > MOST_LINES:
+            left_out.append(other.name)
             continue
-        met = [nearest(one, line, since_s=now_s) for one in _timed(mine.on_board, way_m, now_s)]
-        found += [(at, other) for at in met if at is not None and at.distance_m < NEAR_M]
-    if not found:
+        for part in parts:
+            met = None if part is None else nearest(part, line, since_s=now_s)
+            if met is not None and met.distance_m < NEAR_M:
+                return _meets(mine, other, met, origin_deg, now_s)
+    if not left_out:
         return None
-    at, other = min(found, key=lambda each: (each[0].distance_m, each[0].t_s))
+    text = f"Not held against this mission, because too many fly around it: the lines of {', '.join(left_out)}."
+    return _row("accept", text, "Agree with whoever flies them.")
+
+
+def _meets(mine: Other, other: Flown, met: Nearest, origin_deg: tuple[float, float], now_s: float) -> CheckRow:
     begun, begin = ("Resumed", "Resume") if mine.waits_in_air else ("Started", "Start")
-    text = f"{begun} now, it may come within {at.distance_m:.0f} m of {other.name} in {max(0.0, at.t_s - now_s):.0f} s,"
-    return _row("bad", f"{text} at {_place(origin_deg, at)}.", f"{begin} later, and call the other station.")
+    text = (
+        f"{begun} now, it may come within {met.distance_m:.0f} m of {other.name} in {max(0.0, met.t_s - now_s):.0f} s,"
+    )
+    return _row("accept", f"{text} at {_place(origin_deg, met)}.", f"{begin} later, and call the other station.")
+
+
+def _until(line: TimedLine, end_s: float) -> TimedLine | None:
+    """Of what it may be on before that time; None: on nothing of it."""
+    keep = int(np.searchsorted(line.t_s - line.early_late_s, end_s, side="right"))
+    return None if not keep else replace(line, points_enu_m=line.points_enu_m[: keep + 1], t_s=line.t_s[: keep + 1])
+
+
+def _off_m(origin_deg: tuple[float, float], other: Flown) -> float:
+    return math.hypot(*offset_m(origin_deg, other.state.lat_deg or 0.0, other.state.lon_deg or 0.0))
+
+
+def _boxes_apart_m(one_m: F64, other_m: F64) -> float:
+    """No places of both are nearer to each other."""
+    gap_m = np.maximum(one_m.min(axis=0) - other_m.max(axis=0), other_m.min(axis=0) - one_m.max(axis=0))
+    return float(np.linalg.norm(np.maximum(gap_m, 0.0)))
 
 
 def row_against(mine: Other, others: Sequence[Other], now_s: float) -> CheckRow:

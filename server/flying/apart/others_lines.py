@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from mapping.geometry.frames import MEAN_RADIUS_M
-from server.heard.plan_follower import Ahead
+from mapping.geometry.frames import MEAN_RADIUS_M, offset_m
+from server.heard.plan_follower import OFF_LINE_M, Ahead
 from telemetry.errors import StationsError
-from telemetry.stations.plan_lines import PlanLine, line_id, unpacked
-from telemetry.topics.station_vehicles import OtherVehicle, StationsStatus
+from telemetry.stations.plan_lines import MOST_ERROR_M, PlanLine, line_id, unpacked
+from telemetry.topics.station_vehicles import FleetVehicle, OtherVehicle, StationsStatus
 
-_AGREES_M_S, _AROUND_S = 2.5, 3.0
-"""So near its velocity has to be to that of the line, at some time that is so near."""
 _SHORTEST_S = 0.1
 
 
@@ -20,27 +20,46 @@ class OthersLines:
     """Each is read once. Belongs to the event loop."""
 
     def __init__(self) -> None:
-        self._read: dict[bytes, tuple[int, PlanLine]] = {}
+        self._read: dict[bytes, tuple[int, PlanLine] | None] = {}
         self._of: dict[tuple[str, int], tuple[int, PlanLine]] = {}
 
     def on_status(self, status: StationsStatus) -> None:
         """Only what it tells stays known."""
-        read = dict[bytes, tuple[int, PlanLine]]()
+        read = dict[bytes, tuple[int, PlanLine] | None]()
         of = dict[tuple[str, int], tuple[int, PlanLine]]()
         for line in status.lines:
-            try:
-                known = self._read.get(line.packed) or (line_id(line.packed), unpacked(line.packed))
-            except StationsError:
-                continue  # of a node of another version: its vehicle is taken to fly straight on
-            read[line.packed] = of[line.station, line.number] = known
+            known = self._read[line.packed] if line.packed in self._read else _read(line.packed)
+            read[line.packed] = known
+            if known is not None:
+                of[line.station, line.number] = known
         self._read, self._of = read, of
 
     def of(self, other: OtherVehicle) -> PlanLine | None:
-        """What it flies now; None: not known, or it has left it, or holds."""
+        """What it flies now; None: not known, or it is not on it, or holds."""
         known = self._of.get((other.station, other.it.number))
         if known is None or other.it.line_s is None or known[0] != other.it.line:
             return None
-        return known[1]
+        return None if off_line_m(known[1], other.it) is None else known[1]
+
+
+def _read(payload: bytes) -> tuple[int, PlanLine] | None:
+    """None: of a node of another version, or so wrong that it says nothing; its vehicle only flies straight on."""
+    try:
+        line = unpacked(payload)
+    except StationsError:
+        return None
+    return (line_id(payload), line) if line.error_m <= MOST_ERROR_M else None
+
+
+def off_line_m(line: PlanLine, it: FleetVehicle) -> float | None:
+    """From where it is told to be to where its line is at that time, by place and height above the sea; None: either is
+    not known, or it is farther off than one that flies it can be."""
+    if it.line_s is None or it.lat_deg is None or it.lon_deg is None or it.alt_amsl_m is None:
+        return None
+    lat_deg, lon_deg = (float(np.interp(it.line_s, line.t_s, line.lat_lon_deg[:, axis])) for axis in (0, 1))
+    up_m = float(np.interp(it.line_s, line.t_s, line.alt_amsl_m)) - it.alt_amsl_m
+    off_m = math.hypot(*offset_m((it.lat_deg, it.lon_deg), lat_deg, lon_deg), up_m)
+    return off_m if off_m <= OFF_LINE_M + line.error_m else None
 
 
 def ahead_of(line: PlanLine, line_s: float) -> tuple[Ahead, float] | None:
@@ -50,16 +69,6 @@ def ahead_of(line: PlanLine, line_s: float) -> tuple[Ahead, float] | None:
         return None
     left = Ahead(line.lat_lon_deg[first:], line.alt_amsl_m[first:], line.t_s[first:] - line_s)
     return left, _fastest_m_s(line)
-
-
-def flies_along(line: PlanLine, line_s: float, v_enu_m_s: tuple[float, float, float] | None) -> bool:
-    """Whether it moves as the line says around that time: who stands on it, or crosses it, does not fly it now."""
-    if v_enu_m_s is None:
-        return False
-    steps_m, took_s = _steps(line)
-    near = (line.t_s[1:] >= line_s - _AROUND_S) & (line.t_s[:-1] <= line_s + _AROUND_S)
-    off_m_s = np.linalg.norm(steps_m[near] / took_s[near, None] - np.array(v_enu_m_s), axis=1)
-    return bool((off_m_s <= _AGREES_M_S).any())
 
 
 def _steps(line: PlanLine) -> tuple[F64, F64]:

@@ -15,7 +15,7 @@ from planning.following.thinned import thinned
 from server.errors import reported
 from server.heard.channel import Channel
 from server.heard.plan_follower import Followed
-from telemetry.stations.plan_lines import MOST_POINTS, PlanLine, line_id, packed
+from telemetry.stations.plan_lines import MOST_ERROR_M, MOST_POINTS, ROUNDED_M, PlanLine, line_id, packed
 from telemetry.topics.station_vehicles import FleetLine
 
 log = logging.getLogger("hedgehop.flying")
@@ -25,6 +25,9 @@ GOOD_ENOUGH_M = 1.0
 """With fewer points no more is gained."""
 _HOME_STEP_M = 0.5
 """By so much home has to move to make another line of the same plan; less is part of the error."""
+
+_CENTIMETRE_M = 0.01
+"""To a whole one the error is raised as it is told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +84,9 @@ class OwnLines:
 def _made(number: int, followed: Followed, home_alt_amsl_m: float) -> _Made:
     try:
         line = line_of_plan(followed, home_alt_amsl_m)
+        if line is not None and line.error_m + ROUNDED_M > MOST_ERROR_M - _CENTIMETRE_M:
+            log.info("Vehicle %d flies a plan of too many turns: other stations are not told its line.", number)
+            line = None
         payload = None if line is None else packed(line)
     except Exception as error:
         log.warning("A line for other stations: %s", reported(error, log, "Making a line").what)

@@ -32,7 +32,9 @@ def fleet_vehicle(
     velocity = None
     if state.v_east_m_s is not None and state.v_north_m_s is not None and state.v_down_m_s is not None:
         velocity = state.v_east_m_s, state.v_north_m_s, -state.v_down_m_s
-    is_flown = channel.in_air and follow is not None and follow.progress is not None
+    # A guided way that leads to no item of the mission is not the plan that is on board.
+    is_way = channel.flight.way == "guided" and channel.flight.target is None
+    is_flown = channel.in_air and not is_way and follow is not None and follow.progress is not None
     return FleetVehicle(
         number=doc.number,
         name=doc.name,

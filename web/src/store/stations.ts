@@ -49,7 +49,7 @@ function age({ age_s, lat_deg }: OtherVehicleDoc): string {
 const PHASES: Partial<Record<string, string>> = {
   arming: "is being armed",
   taking_off: "takes off",
-  flying: "flies its plan",
+  flying: "under way",
   paused: "holds",
   returning: "returns",
   landed: "landed",
