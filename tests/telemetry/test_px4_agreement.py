@@ -99,13 +99,18 @@ def judged(heard: list[tuple[float, Any]], mission: Mission) -> Flown:
         float(np.median(flown[:, 4])),
         float(home[:, 4].max()),
         float(home[:, 3].max()),
-        float(np.median(landing[landing[:, 3] > SLOWER_BELOW_M, 5])),
+        _sink_m_s(landing[landing[:, 3] > SLOWER_BELOW_M]),
         said["Takeoff detected"] - said["Armed by external command"],
     )
 
 
 def _between(track: F64, from_s: float, to_s: float) -> F64:
     return track[(track[:, 0] >= from_s) & (track[:, 0] <= to_s)]
+
+
+def _sink_m_s(track: F64) -> float:
+    """By its heights: the velocity that it tells is off by up to 0.15 m/s for half a minute."""
+    return float((track[0, 3] - track[-1, 3]) / (track[-1, 0] - track[0, 0]))
 
 
 def _half_turn_s(track: F64) -> float:
@@ -156,19 +161,60 @@ def simulated(mission: Mission) -> list[Flown]:
     return [simulated_flight(mission, seed) for seed in SEEDS]
 
 
-@pytest.mark.fact("P7")
-def test_led_from_place_to_place_it_leaves_the_line_as_far(shared_data: Path) -> None:
-    """Recorded: 1.12 m at most and 0.77 m in 95 % beside the line, from 0.59 m below to 0.47 m above it."""
+class Led(NamedTuple):
+    """From place to place in HOLD."""
+
+    beside_m: F64
+    above_m: F64
+    seconds: float
+    """From the first order to the way home."""
+
+
+@pytest.fixture(scope="module")
+def led(shared_data: Path) -> list[Led]:
     plan = shared_data / "logs" / "real_flights" / "plans" / "px4" / "mission.waypoints"
-    flown = [ScriptedFlight(plan, make="px4", gnss="rtk", seed=seed) for seed in range(2)]
-    beside_m, above_m = (np.concatenate(part) for part in zip(*(_off(flight) for flight in flown), strict=True))
-    assert np.percentile(beside_m, 95) == pytest.approx(0.77, rel=0.3)
-    assert beside_m.max() == pytest.approx(1.12, rel=0.3)
-    assert np.percentile(np.abs(above_m), 95) == pytest.approx(0.43, rel=0.3)
+    flights = (ScriptedFlight(plan, make="px4", gnss="rtk", seed=seed) for seed in SEEDS)
+    return [
+        Led(*off_line(flight.track[:, 1:4], flight.line), float(flight.track[-1, 0] - flight.track[0, 0]))
+        for flight in flights
+    ]
 
 
-def _off(flight: ScriptedFlight) -> tuple[F64, F64]:
-    return off_line(flight.track[:, 1:4], flight.line)
+LED: dict[str, tuple[Callable[[Led], float], float, float]] = {
+    "beside the line, 95 %": (lambda it: float(np.percentile(it.beside_m, 95)), 0.77, 0.15),
+    "beside the line, at most": (lambda it: float(it.beside_m.max()), 1.12, 0.15),
+    "beside the line, mean": (lambda it: float(it.beside_m.mean()), 0.34, 0.15),
+    "first order to the way home": (lambda it: it.seconds, 97.9, 0.1),
+}
+"""What was recorded, and how near the mean of three flights has to be: of more flights it is within 10 %."""
+
+
+@pytest.mark.fact("P7", "P8")
+@pytest.mark.parametrize("name", LED)
+def test_led_from_place_to_place_it_flies_as_the_recorded_one(led: list[Led], name: str) -> None:
+    of, recorded, within = LED[name]
+    flown = [of(flight) for flight in led]
+    assert np.mean(flown) == pytest.approx(recorded, rel=within), [round(value, 2) for value in flown]
+
+
+HEIGHTS: dict[str, Callable[[F64], float]] = {
+    "below the line, at most": lambda above_m: -float(above_m.min()),
+    "above the line, at most": lambda above_m: float(above_m.max()),
+    "height, 95 %": lambda above_m: float(np.percentile(np.abs(above_m), 95)),
+}
+LED_HEIGHTS_M = {"below the line, at most": 0.59, "above the line, at most": 0.47, "height, 95 %": 0.45}
+
+
+@pytest.mark.fact("P6", "P7")
+@pytest.mark.parametrize("name", HEIGHTS)
+def test_in_height_both_flights_together_are_as_the_recorded_two(
+    real: Flown, simulated: list[Flown], led: list[Led], name: str
+) -> None:
+    """The recorded two differ by up to 70 % in these, as no two means of simulated flights do."""
+    of = HEIGHTS[name]
+    recorded_m = (of(real.above_m) + LED_HEIGHTS_M[name]) / 2
+    flown_m = [(of(one.above_m) + of(other.above_m)) / 2 for one, other in zip(simulated, led, strict=True)]
+    assert np.mean(flown_m) == pytest.approx(recorded_m, rel=0.15), [round(value, 2) for value in flown_m]
 
 
 class Figure(NamedTuple):
@@ -180,10 +226,10 @@ class Figure(NamedTuple):
 FIGURES: dict[str, Figure] = {
     "beside the line, 95 %": Figure(lambda flown: float(np.percentile(flown.beside_m, 95))),
     "beside the line, at most": Figure(lambda flown: float(flown.beside_m.max())),
-    "beside the line, mean": Figure(lambda flown: float(flown.beside_m.mean()), within=0.25),
+    "beside the line, mean": Figure(lambda flown: float(flown.beside_m.mean()), within=0.2),
     "below the line, at most": Figure(lambda flown: -float(flown.above_m.min()), within=0.2),
-    "above the line, at most": Figure(lambda flown: float(flown.above_m.max())),
-    "height, 95 %": Figure(lambda flown: float(np.percentile(np.abs(flown.above_m), 95)), within=0.12),
+    "above the line, at most": Figure(lambda flown: float(flown.above_m.max()), within=0.35),
+    "height, 95 %": Figure(lambda flown: float(np.percentile(np.abs(flown.above_m), 95)), within=0.25),
     "the legs": Figure(lambda flown: float(flown.legs_s.sum()), within=0.05),
     "take-off": Figure(lambda flown: flown.climb_s),
     "way home": Figure(lambda flown: flown.return_s),

@@ -229,7 +229,9 @@ class Px4Pilot(Px4Flying):
     def update(self, sensed: Sensed, dt_s: float) -> Demand | None:
         """What is asked of the airframe; None: motors off or idling."""
         self.now_s += dt_s
-        self.p_neu, self.v_neu, self.above_ground_m = sensed.p_neu, sensed.v_neu, sensed.above_ground_m
+        self.p_neu, self.above_ground_m = sensed.p_neu, sensed.above_ground_m
+        (vn, ve, vu), (slip_n, slip_e, slip_u) = sensed.v_neu, self._unrest.slip_neu
+        self.v_neu = (vn + slip_n, ve + slip_e, vu + slip_u)
         self._boot()
         self.keep_to_fence(self.mode.name)
         if not self.armed:
@@ -267,7 +269,7 @@ class Px4Pilot(Px4Flying):
         accel = self.control.demand(
             self.target, self.p_neu, self.v_neu, dt_s, climb_m_s=climb_m_s, tilt_rad=math.radians(tilt)
         )
-        shaken = self._unrest.step(dt_s)
+        shaken = self._unrest.step(sensed.heading_rad, dt_s)
         turning = (math.radians(self.parameters[f"MPC_YAWRAUTO_{name}"]) for name in ("ACC", "MAX"))
         accel_rad_s2, fastest_rad_s = turning
         self._turn.step(self.heading_goal_rad, dt_s, accel_rad_s2=accel_rad_s2, fastest_rad_s=fastest_rad_s)
@@ -313,6 +315,7 @@ class Px4Pilot(Px4Flying):
 
     def _stop_motors(self) -> None:
         self.armed = self.flying = self.is_in_air = False
+        self._unrest.rest()
         self._touched_s = -math.inf
         self.cruise_m_s = None
         if self.missions.state != "complete":
