@@ -49,6 +49,13 @@ HeightsOption = Annotated[
     Heights,
     Option(help="Floor and ceiling are parameters of the vehicle: show what would change, or set them too."),
 ]
+LooserOption = Annotated[
+    bool,
+    Option(
+        "--looser",
+        help="With --heights set: even where that raises the ceiling or lowers the floor that acts now.",
+    ),
+]
 _NOT_ITEMS = (
     "floor and ceiling are no items of a fence: --heights set sets them on the vehicle, --heights show says how."
 )
@@ -65,13 +72,16 @@ def fence(
     file: FileArgument = None,
     *,
     heights: HeightsOption = "leave",
+    looser: LooserOption = False,
     data_dir: o.Keys = None,
     as_json: o.AsJson = False,
 ) -> None:
     """Send a fence to the vehicle and read it back, save the one on board, or clear it."""
     if heights != "leave" and action != "upload":
         raise ParameterError(f"--heights {heights} goes with upload alone.", advice="Leave it out.")
-    _run("fence", link, action, file, data_dir, as_json=as_json, heights=heights)
+    if looser and heights != "set":
+        raise ParameterError("--looser goes with --heights set alone.", advice="Leave it out.")
+    _run("fence", link, action, file, data_dir, as_json=as_json, heights=heights, looser=looser)
 
 
 @command
@@ -96,6 +106,7 @@ def _run(
     *,
     as_json: bool,
     heights: Heights = "leave",
+    looser: bool = False,
 ) -> None:
     parse_addresses(link)
     job = _Job(kind, link, data_dir)
@@ -105,7 +116,7 @@ def _run(
     if action == "clear" and file is not None:
         raise ParameterError("Clearing takes no file.", where=clean_name(file.name), advice="Leave the file out.")
     places = (Fence(), ()) if action == "clear" else _read(kind, _target(file, action), heights)
-    done = asyncio.run(job.send(places, heights))
+    done = asyncio.run(job.send(places, heights, looser=looser))
     summary: dict[str, Any] = {"list": kind, "action": action}
     lines: list[str] = []
     if done.report is not None:
@@ -132,12 +143,16 @@ class _Job:
     link: str
     data_dir: Path | None
 
-    async def send(self, places: Places, heights: Heights) -> _Done:
+    async def send(self, places: Places, heights: Heights, *, looser: bool) -> _Done:
         async with own_nodes(recorder=False, data_dir=self.data_dir) as station, watching(station.bus) as watch:
             state = await connect(station.link, watch, self.link, OPERATOR, say)
             firmware: Firmware = "px4" if state.autopilot == "px4" else "ardupilot"
             # What cannot be set is told before anything is sent.
-            found = None if heights == "leave" else await read_heights(station.link, places[0], firmware)
+            found = None
+            if heights != "leave":
+                found = await read_heights(
+                    station.link, places[0], firmware, writes=heights == "set", may_loosen=looser
+                )
             items, report = _items(self.kind, places, firmware), None
             if items or heights == "leave":
                 report = await station.link.call(UploadPlaces(OPERATOR, self.kind, wire_items(items)))

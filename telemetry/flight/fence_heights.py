@@ -73,7 +73,9 @@ class HeightChanges:
     changes: tuple[HeightChange, ...]
     """None where all is so already. The fence is switched on last, off before where it takes its kinds only then."""
     notes: tuple[str, ...]
-    """What this means besides, in whole sentences."""
+    """What this means besides, in whole sentences; ``looser`` first."""
+    looser: tuple[str, ...] = ()
+    """What acts now and is stricter: to be set only by whoever says that it shall be."""
 
 
 def heights_aboard(parameters: Mapping[str, float | None], firmware: Firmware) -> Fence:
@@ -127,10 +129,15 @@ def lowest_way_m(parameters: Mapping[str, float | None], firmware: Firmware) -> 
 
 
 def height_changes(
-    fence: Fence, parameters: Mapping[str, float | None], firmware: Firmware, *, home_rises_m: float = 0.0
+    fence: Fence,
+    parameters: Mapping[str, float | None],
+    firmware: Firmware,
+    *,
+    home_rises_m: float = 0.0,
+    untaken_kinds: int = 0,
 ) -> HeightChanges:
     """``home_rises_m``: the vehicle's home above the one that was planned for. The worse end counts: the vehicle's
-    ceiling is above neither, its floor below neither.
+    ceiling is above neither, its floor below neither. ``untaken_kinds``: as in VehicleState.
 
     Raises NotAllowedError where the vehicle cannot have them, or would not arm with them.
     """
@@ -145,12 +152,14 @@ def height_changes(
     if ceiling_m is not None and ceiling_m <= 0:
         what = f"A ceiling at {ceiling_m:g} m above home is none: the vehicle stands above it on the ground."
         raise NotAllowedError(what, advice="Raise the ceiling, or start from lower ground.")
-    made = _px4 if firmware == "px4" else _ardupilot
-    wanted, notes = made(floor_m, ceiling_m, fence, parameters)
+    if firmware == "px4":
+        wanted, notes = _px4(floor_m, ceiling_m, parameters)
+    else:
+        wanted, notes = _ardupilot(floor_m, ceiling_m, fence, parameters, untaken_kinds)
     found = tuple(each for each in wanted if abs(each.before - each.after) > SAME_M)
     after = dict(parameters) | {each.name: each.after for each in found}
-    looser = _looser(heights_aboard(parameters, firmware), heights_aboard(after, firmware))
-    return HeightChanges(found, (*looser, *notes, *filter(None, (at_fence(after, firmware),))))
+    looser = tuple(_looser(heights_aboard(parameters, firmware), heights_aboard(after, firmware)))
+    return HeightChanges(found, (*looser, *notes, *filter(None, (at_fence(after, firmware),))), looser)
 
 
 def _looser(before: Fence, after: Fence) -> list[str]:
@@ -166,9 +175,8 @@ def _looser(before: Fence, after: Fence) -> list[str]:
 
 
 def _px4(
-    floor_m: float | None, ceiling_m: float | None, fence: Fence, parameters: Mapping[str, float | None]
+    floor_m: float | None, ceiling_m: float | None, parameters: Mapping[str, float | None]
 ) -> tuple[list[HeightChange], list[str]]:
-    del fence
     if ceiling_m is None:
         raise NotAllowedError(NO_FLOOR, advice="Only a ceiling can be set there.")
     action = _told(parameters, "GF_ACTION")
@@ -183,7 +191,11 @@ def _px4(
 
 
 def _ardupilot(
-    floor_m: float | None, ceiling_m: float | None, fence: Fence, parameters: Mapping[str, float | None]
+    floor_m: float | None,
+    ceiling_m: float | None,
+    fence: Fence,
+    parameters: Mapping[str, float | None],
+    untaken_kinds: int,
 ) -> tuple[list[HeightChange], list[str]]:
     kinds_before, was_on = int(_told(parameters, "FENCE_TYPE")), bool(is_switched_on(parameters, "ardupilot"))
     own = CEILING_BIT * (ceiling_m is not None) | FLOOR_BIT * (floor_m is not None)
@@ -201,7 +213,7 @@ def _ardupilot(
         wanted.append(HeightChange("FENCE_ALT_MIN", _told(parameters, "FENCE_ALT_MIN"), floor_m, "m"))
     wanted.append(HeightChange("FENCE_TYPE", kinds_before, kinds))
     enabled, notes = _told(parameters, "FENCE_ENABLE"), list[str]()
-    if enabled == 1 and kinds & ~kinds_before & ~FLOOR_BIT:
+    if enabled == 1 and kinds & ~(kinds_before & ~untaken_kinds) & ~FLOOR_BIT:
         wanted.append(HeightChange("FENCE_ENABLE", enabled, 0))
         enabled = 0.0
         notes.append(TAKEN_WHEN_SWITCHED)
@@ -216,7 +228,7 @@ def _ardupilot(
         radius_m = parameters.get("FENCE_RADIUS")
         size = "" if radius_m is None else f", {radius_m:g} m"
         notes.append(f"The circle around home (FENCE_RADIUS{size}) stays off: the plan has none.")
-    if kinds_before & SHAPES_BIT and not kinds & SHAPES_BIT:
+    if not kinds & SHAPES_BIT:  # whatever it said before: which shapes are on board was not read
         notes.append("Shapes on board, where there are any, stay off (FENCE_TYPE): the plan has none.")
     if kinds_before & FLOOR_BIT and not kinds & FLOOR_BIT:
         notes.append("The floor (FENCE_ALT_MIN) stays off: the plan has none.")

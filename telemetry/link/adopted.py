@@ -9,6 +9,7 @@ from typing import Literal, cast
 
 from planning.basics.plan_model import Firmware
 from telemetry.errors import NotAllowedError, RefusedError, SilentError
+from telemetry.flight.fence_kinds import untaken_words
 from telemetry.link.exchanges import Exchanges
 from telemetry.link.heartbeat import heartbeat
 from telemetry.link.line import Line
@@ -293,6 +294,7 @@ class AdoptedVehicle:
             self._restarted(now_s)
         if self.onboard.on_message(message, now_s):
             self._telling.unsure()
+        self._tell_kinds(now_s)
         self._on_heard(self._speech.on_message(message, now_s), now_s)
 
     def _on_heard(self, heard: HeardWords, now_s: float) -> None:
@@ -304,6 +306,15 @@ class AdoptedVehicle:
             self.send(request)
         if not self.state.armed and self._speech.take_wish():
             self.send(self.orders.check_before_arming())
+
+    def _tell_kinds(self, now_s: float) -> None:
+        """Of its fence, once for each change."""
+        untaken, before = self.onboard.fence.kinds.untaken, self.state.fence_kinds_untaken
+        if untaken == before:
+            return
+        if words := untaken_words(untaken & ~before):
+            self._telling.text(WARNING, words)
+        self._on_state(replace(self.state, fence_kinds_untaken=untaken), now_s)
 
     def _tell_doubt(self, now_s: float) -> None:
         """Once for each time: a real crash disarms in the air, too."""

@@ -9,9 +9,11 @@ from typing import Literal
 
 from telemetry.errors import MissionUnknownError, NotAllowedError
 from telemetry.flight.avoidance.fence_aboard import FenceAboard
+from telemetry.flight.fence_kinds import NAMES as FENCE_KINDS
 from telemetry.flight.guided.beginning import Steady, why_not_from, why_not_gone_on
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.autopilot_orders import MISSION_MODES
+from telemetry.mavlink.parameters.values import parameter_value
 from telemetry.topics.onboard_lists import OnboardMission
 from telemetry.topics.requests import FlyWay, TakeUp
 from telemetry.topics.vehicle import VehicleState
@@ -97,13 +99,16 @@ class OnBoard:
     def forget(self) -> None:
         """The vehicle restarted, or is another one."""
         self.mission, self._seen = None, None
+        self.fence.kinds.forget()
         self.fence.forget("has not been read back since the vehicle was silent or restarted")
 
     def on_message(self, message: Message, now_s: float) -> bool:
         """True when this message shows that somebody else has replaced the mission: it is unknown from now on."""
+        kind = message.get_type()
+        if kind == "PARAM_VALUE" and message.param_id in FENCE_KINDS:  # ArduPilot's: no integer comes bytewise
+            self.fence.take({message.param_id: parameter_value(message, bytewise=False)})
         if self._transferring:
             return False
-        kind = message.get_type()
         if kind == "MISSION_CURRENT":
             self._counted_s = now_s
         if kind == "STATUSTEXT":  # of an upload of ours it comes before the read-back

@@ -119,6 +119,8 @@ class VehicleState:
     """The fence bit of SYS_STATUS; None: no fence is switched on, or it is not told."""
     fence_breach: FenceBreach | None = None
     """What of its fence the vehicle is beyond, of FENCE_STATUS; None: not told."""
+    fence_kinds_untaken: int = 0
+    """Bits of ArduPilot's FENCE_TYPE that were added while its fence was on: it may not act on them yet."""
     estimator_ratio: float | None = None
     """How far its measurements disagree, the worst kind; 1 is where they are refused (PX4: test ratio; ArduPilot: the
     innovation over what its filter allows)."""

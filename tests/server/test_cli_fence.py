@@ -71,6 +71,32 @@ def test_floor_and_ceiling_are_shown_then_set_and_found_as_they_should_be(link: 
     assert (values["FENCE_ALT_MAX"], values["FENCE_ALT_MIN"], values["FENCE_TYPE"]) == (60.0, 5.0, 9.0)
 
 
+def test_a_looser_ceiling_than_the_one_that_acts_is_set_by_whoever_says_so_alone(link: str, tmp_path: Path) -> None:
+    strict, loose = tmp_path / "strict.plan", tmp_path / "loose.plan"
+    strict.write_text(write_fence(strict.name, Fence(ceiling_rel_home_m=40.0), ()))
+    shape = circle(LAT, LON, 90.0, inclusion=True, where="t")
+    loose.write_text(write_fence(loose.name, Fence(circles=(shape,), ceiling_rel_home_m=70.0), ()))
+    assert hedgehop("fence", link, "clear").code == 0
+    assert hedgehop("fence", link, "upload", strict, "--heights", "set").code == 0
+
+    def ceiling_and_shapes() -> tuple[float, int]:
+        held = hedgehop("params", "get", "FENCE_ALT_MAX", "--link", link, "--json")
+        shapes = hedgehop("fence", link, "download", tmp_path / "onboard.plan", "--json")
+        return held.json["parameters"][0]["value"], shapes.json["items"]
+
+    refused = hedgehop("fence", link, "upload", loose, "--heights", "set")
+    assert refused.code != 0
+    assert "This raises the ceiling that acts now, from 40 to 70 m above home. Nothing was sent." in refused.err
+    assert "--looser" in refused.err
+    assert ceiling_and_shapes() == (40.0, 0)
+    shown = hedgehop("fence", link, "upload", strict, "--heights", "show", "--json")
+    assert shown.json["heights"]["looser"] == []
+    wanted = hedgehop("fence", link, "upload", loose, "--heights", "set", "--looser", "--json")
+    assert wanted.code == 0, wanted.err
+    assert wanted.json["heights"]["looser"] == ["This raises the ceiling that acts now, from 40 to 70 m above home."]
+    assert ceiling_and_shapes() == (70.0, 1)
+
+
 def test_rally_points_go_up_in_whole_metres_and_come_down(link: str, tmp_path: Path) -> None:
     file, onboard = tmp_path / "rally.plan", tmp_path / "onboard.geojson"
     file.write_text(write_fence(file.name, Fence(), RALLY))
@@ -93,6 +119,7 @@ def test_rally_points_go_up_in_whole_metres_and_come_down(link: str, tmp_path: P
         (("rally", "tcp:127.0.0.1:1", "upload", "FENCE"), "holds no rally points"),
         (("fence", "tcp:127.0.0.1:1", "upload", "FENCE", "--heights", "set"), "neither floor nor ceiling"),
         (("fence", "tcp:127.0.0.1:1", "clear", "--heights", "set"), "goes with upload alone"),
+        (("fence", "tcp:127.0.0.1:1", "upload", "FENCE", "--looser"), "goes with --heights set alone"),
     ],
 )
 def test_wrong_input_is_told_before_any_vehicle_is_asked(arguments: tuple[str, ...], said: str, tmp_path: Path) -> None:

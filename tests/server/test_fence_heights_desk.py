@@ -61,7 +61,7 @@ class Bench:
         record = SimpleNamespace(firmware="ardupilot", plan_json=plan.model_dump_json(), heights_moved_m=0.0)
         self.link, self.rises_m = Link(), 0.0
         self.aboard: Any = SimpleNamespace(record=record)
-        self.live: Any = SimpleNamespace(state=SimpleNamespace(armed=False))
+        self.live: Any = SimpleNamespace(state=SimpleNamespace(armed=False, fence_kinds_untaken=0))
         self.told: list[tuple[ParameterWritten, ...]] = []
         link: Any = self.link
         self.desk = FenceHeights(link, self.live, self.aboard, lambda: self.rises_m, self._on_written)

@@ -123,6 +123,60 @@ def test_a_ceiling_that_does_not_act_or_is_not_known_ends_no_climb(values: dict[
     assert fence.highest_m == math.inf
 
 
+ROUND_HOME: dict[str, float | None] = {
+    "FENCE_ENABLE": 1.0, "FENCE_TYPE": 2.0, "FENCE_ALT_MAX": 90.0, "FENCE_ALT_MIN": -10.0, "FENCE_RADIUS": 28.0,
+}  # fmt: skip
+PX4_ROUND_HOME: dict[str, float | None] = {"GF_ACTION": 3.0, "GF_MAX_VER_DIST": 0.0, "GF_MAX_HOR_DIST": 28.0}
+
+
+@pytest.mark.parametrize(
+    ("kept", "name"), [(ROUND_HOME, "FENCE_RADIUS"), (PX4_ROUND_HOME, "GF_MAX_HOR_DIST")], ids=["ardupilot", "px4"]
+)
+def test_a_prepared_way_out_of_the_circle_around_home_is_refused_and_the_mission_goes_on(
+    kept: dict[str, float | None], name: str
+) -> None:
+    it = craft()
+    it.avoiding.fence.read_back(())
+    it.avoiding.fence.take(kept)
+    it.until(lambda: it.truth[0] > 8)
+    request = FlyManoeuvre(ME, "around", targets((14, 12, 8), (26, 12, 8), (30, 0, 8)), 2)
+    with pytest.raises(NotAllowedError, match=rf"would leave the circle around home \({name}\) of the fence on board"):
+        it.avoiding.fly(request, remaining_at(it, 2), it.now_s)
+    assert state(it) == "watching"
+    near = FlyManoeuvre(ME, "around", targets((14, 5, 8), (20, 5, 8), (24, 0, 8)), 2)
+    it.perform(it.avoiding.fly(near, remaining_at(it, 2), it.now_s))
+    assert state(it) == "manoeuvre"
+
+
+def test_after_a_climb_it_does_not_go_on_out_of_the_circle_around_home() -> None:
+    """It neither steps aside nor flies on there: the mission's line leads beyond it."""
+    it = followed(stands(25.0, 0.0), walls=[Wall(24.0, 12.0, half_wide_m=3.0)])
+    it.avoiding.fence.read_back(())
+    it.avoiding.fence.take(ROUND_HOME | {"FENCE_RADIUS": 24.0})
+    said = "It would leave the circle around home (FENCE_RADIUS) of the fence on board."
+    it.until(lambda: f"{said} It holds" in it.avoiding.status.text)
+    it.advance(10.0)
+    assert max(north_m for _, north_m, _ in it.trail) < 24.0
+
+
+@pytest.mark.parametrize(
+    "values", [{"FENCE_ENABLE": 0.0}, {"FENCE_TYPE": 5.0}, {"FENCE_RADIUS": 300.0}, {"FENCE_RADIUS": None}]
+)
+def test_a_circle_around_home_that_does_not_act_is_wide_or_not_known_keeps_nobody(
+    values: dict[str, float | None],
+) -> None:
+    it = craft()
+    it.avoiding.fence.read_back(())
+    it.avoiding.fence.take(ROUND_HOME | values)
+    it.until(lambda: it.truth[0] > 8)
+    request = FlyManoeuvre(ME, "around", targets((14, 12, 8), (26, 12, 8), (30, 0, 8)), 2)
+    it.avoiding.check_may_fly(request)
+    unread = it.avoiding.fence.unread(it.state)
+    assert unread == (
+        "The circle around home of the fence on board has not been read" if None in values.values() else ""
+    )
+
+
 def test_after_the_climb_it_does_not_go_on_where_that_would_breach_the_fence() -> None:
     it = craft(Wall(25, 14))
     it.until(lambda: state(it) == "climbing")
@@ -161,7 +215,10 @@ def test_beyond_its_fence_already_it_takes_no_way_at_all() -> None:
 def test_a_fence_that_nobody_has_read_is_said_until_it_is() -> None:
     it = craft()
     assert it.avoiding.status.text.startswith("The fence on board has not been read back")
+    assert "is held against it." in it.avoiding.status.text
     it.avoiding.fence.read_back(())
+    assert "(ceiling, circle around home) has not been read" in it.avoiding.status.text
+    it.avoiding.fence.take({"FENCE_ENABLE": 0.0})
     assert it.avoiding.status.text == ""
     it.avoiding.fence.read_back(polygon(EXCLUSION, NOTHING_EAST)[:3])
     assert "is not understood: the fence on board, item 1" in it.avoiding.status.text

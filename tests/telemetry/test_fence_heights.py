@@ -67,13 +67,33 @@ def test_a_fence_that_is_on_is_switched_anew_where_it_gains_a_kind_that_it_takes
     assert (TAKEN_WHEN_SWITCHED in made.notes) is is_anew
 
 
+def test_a_kind_that_was_named_while_it_was_on_is_not_taken_for_one_that_acts() -> None:
+    held = after(height_changes(BOTH, COPTER | {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0}, "ardupilot"), COPTER)
+    assert height_changes(BOTH, held, "ardupilot").changes == ()
+    made = height_changes(BOTH, held, "ardupilot", untaken_kinds=1)
+    assert words(made) == ["FENCE_ENABLE 1 -> 0", "FENCE_ENABLE 0 -> 1"]
+    assert TAKEN_WHEN_SWITCHED in made.notes
+
+
+@pytest.mark.parametrize("kinds", [1.0, 5.0])
+def test_shapes_that_no_plan_of_ours_has_stay_off_and_that_is_said(kinds: float) -> None:
+    """Whether FENCE_TYPE named them while the fence was off or not: which are on board is not read for it."""
+    notes = " ".join(height_changes(BOTH, COPTER | {"FENCE_TYPE": kinds}, "ardupilot").notes)
+    assert "Shapes on board, where there are any, stay off" in notes
+    acting = COPTER | {"FENCE_TYPE": 5.0, "FENCE_ENABLE": 1.0}
+    assert "Shapes on board" not in " ".join(height_changes(BOTH, acting, "ardupilot").notes)
+
+
 def test_a_ceiling_or_a_floor_that_acts_and_is_stricter_is_not_loosened_without_a_word() -> None:
     acts = COPTER | {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 9.0, "FENCE_ALT_MAX": 40.0, "FENCE_ALT_MIN": 8.0}
-    notes = height_changes(BOTH, acts, "ardupilot").notes
-    assert notes[0] == "This raises the ceiling that acts now, from 40 to 60 m above home."
-    assert notes[1] == "This lowers the floor that acts now, from 8 to 5 m above home."
+    made = height_changes(BOTH, acts, "ardupilot")
+    assert made.notes[0] == "This raises the ceiling that acts now, from 40 to 60 m above home."
+    assert made.notes[1] == "This lowers the floor that acts now, from 8 to 5 m above home."
+    assert made.looser == made.notes[:2]
     for stricter in ({"FENCE_ALT_MAX": 70.0, "FENCE_ALT_MIN": 4.0}, {"FENCE_ENABLE": 0.0}):
-        assert "that acts now" not in " ".join(height_changes(BOTH, acts | stricter, "ardupilot").notes)
+        made = height_changes(BOTH, acts | stricter, "ardupilot")
+        assert "that acts now" not in " ".join(made.notes)
+        assert made.looser == ()
     px4 = height_changes(Fence(ceiling_rel_home_m=60.0), PX4 | {"GF_MAX_VER_DIST": 30.0}, "px4")
     assert "This raises the ceiling that acts now" in px4.notes[0]
 

@@ -707,6 +707,7 @@ export interface VehicleState {
   estimator_ok: boolean | null;
   fence_ok: boolean | null;
   fence_breach: "none" | "floor" | "ceiling" | "boundary" | null;
+  fence_kinds_untaken: number;
   estimator_ratio: number | null;
   estimator_ratio_of: "velocity" | "place" | "height" | "compass" | "airspeed" | "terrain" | null;
   vibration_t_mono_s: number | null;

@@ -10,12 +10,13 @@ from planning.fence.fence_model import Fence
 from server.cli.shared.output import say
 from server.cli.shared.own_nodes import OPERATOR
 from telemetry.bus.link_client import LinkClient
-from telemetry.errors import TelemetryError
+from telemetry.errors import NotAllowedError, TelemetryError
 from telemetry.flight.fence_heights import NAMES, HeightChanges, height_changes
 from telemetry.flight.fence_heights_put import lost, put_heights, unsent
 from telemetry.topics.parameters import ParameterWritten
 from telemetry.topics.requests import ReadParameters
 
+LOOSER_BY = "Give it with --looser if that is wanted, or change the fence's file."
 SHAPES_FIRST = "It was not set: the shapes on board are not those that were sent."
 
 
@@ -38,6 +39,7 @@ class HeightsDone:
             "changes": [{"name": c.name, "before": c.before, "after": c.after} for c in self.found.changes],
             "written": [asdict(one) | {"took": one.took} for one in self.written],
             "notes": list(self.found.notes),
+            "looser": list(self.found.looser),
         }
 
     @property
@@ -57,14 +59,19 @@ def _held(one: ParameterWritten) -> str:
     return "not known" if one.after is None else f"the vehicle holds {one.after:g}"
 
 
-async def read_heights(link: LinkClient, fence: Fence, firmware: Firmware) -> HeightChanges:
-    """Says what would change. Raises NotAllowedError where the vehicle cannot have them, and what the link raises."""
+async def read_heights(
+    link: LinkClient, fence: Fence, firmware: Firmware, *, writes: bool, may_loosen: bool
+) -> HeightChanges:
+    """Says what would change. Raises NotAllowedError where the vehicle cannot have them, or where a stricter one that
+    acts now would be written over and may not be; and what the link raises."""
     parameters = await link.call(ReadParameters(NAMES[firmware]))
     found = height_changes(fence, parameters, firmware)
     for change in found.changes:
         say(f"  {change.words}")
     for note in found.notes:
         say(f"  {note}")
+    if writes and found.looser and not may_loosen:
+        raise NotAllowedError(" ".join((*found.looser, "Nothing was sent.")), advice=LOOSER_BY)
     return found
 
 

@@ -67,8 +67,8 @@ class FenceHeights:
         return FenceHeightsSet(written=written_docs(written), took=all(one.took for one in written))
 
     async def _found(self) -> HeightChanges:
-        record = self._aboard.record
-        if self._live.state is None:
+        record, state = self._aboard.record, self._live.state
+        if state is None:
             raise NoVehicleError("No vehicle is connected.", advice="Connect one first.")
         if record is None:
             raise ConflictError("No plan that was uploaded from here is on board.", advice="Upload the plan first.")
@@ -77,7 +77,9 @@ class FenceHeights:
         parameters = await self._link.call(ReadParameters(NAMES[firmware]))
         # Unknown is not none: the heights of the mission on board were moved for a home that is known.
         rises_m = record.heights_moved_m if self._rises_m is None else self._rises_m
-        return height_changes(fence, parameters, firmware, home_rises_m=rises_m)
+        return height_changes(
+            fence, parameters, firmware, home_rises_m=rises_m, untaken_kinds=state.fence_kinds_untaken
+        )
 
 
 def _docs(found: HeightChanges) -> list[HeightChangeDoc]:

@@ -196,7 +196,7 @@ class Aside:
         braking = Braking(self.settings.brake_decel_m_s2, self.settings.brake_jerk_m_s3)
         stops = _with_speed(velocity, braking.distance_m(speed_m_s))
         places = [moved_deg(here, float(east_m), float(north_m)) for east_m, north_m in (stops, offset)]
-        return self._fence.why_not(here, (here, *places))
+        return self._fence.why_not(state, (here, *places))
 
     def _go(
         self, state: VehicleState, offset: F64, carrot_m: float, found: Proposal, *, on_line: bool, now_s: float

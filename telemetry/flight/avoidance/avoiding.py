@@ -94,6 +94,7 @@ class Avoiding:
             speed_m_s=(self._state and self._state.ground_speed_m_s) or 0.0,
             slowed_to_m_s=self.slowed_to_m_s,
             slowed_as_late=self._slowing.as_late,
+            fence_unread=self.fence.unread(self._state),
         )
         return status_of(now, self.regions, self.detour)
 

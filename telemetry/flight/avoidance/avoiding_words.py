@@ -23,6 +23,8 @@ class Now:
     speed_m_s: float
     slowed_to_m_s: float | None
     slowed_as_late: bool = False
+    fence_unread: str = ""
+    """What is not known of the fence on board besides its shapes."""
 
 
 def status_of(now: Now, regions: Regions, detour: Detour) -> AvoidanceStatus:
@@ -80,14 +82,16 @@ def _text(now: Now, regions: Regions, detour: Detour) -> str:
     slowest = regions.slowest(now.t_s)
     if slowest is None:
         if regions.eyes(now.t_s):
-            return _fence_words(detour)
+            return _fence_words(now, detour)
         return "No sensor sees ahead: nothing brakes by itself."
-    return " ".join(filter(None, (_speed_words(now, *slowest), _late_words(now, regions)))) or _fence_words(detour)
+    return " ".join(filter(None, (_speed_words(now, *slowest), _late_words(now, regions)))) or _fence_words(now, detour)
 
 
-def _fence_words(detour: Detour) -> str:
-    unknown = detour.fence.unknown
-    return f"The fence on board {unknown}: no way of avoidance is held against it." if unknown else ""
+def _fence_words(now: Now, detour: Detour) -> str:
+    if unknown := detour.fence.unknown:
+        what = "it" if now.fence_unread else "its shapes"
+        return f"The fence on board {unknown}: no way of avoidance is held against {what}."
+    return f"{now.fence_unread}: no way of avoidance is held against it." if now.fence_unread else ""
 
 
 def _speed_words(now: Now, sight: Sight, largest_m_s: float) -> str:

@@ -22,15 +22,19 @@ from planning.fence.distance import one_to_polygon, to_circle
 from planning.fence.fence_model import Fence, FenceCircle, FencePolygon, LatLon
 from planning.fence.judge import CIRCLE_SHARE, named_shapes
 from planning.formats.fence_items import fence_of
-from telemetry.flight.fence_heights import heights_aboard
+from telemetry.flight.fence_actions import is_switched_on
+from telemetry.flight.fence_heights import are_heights_told, heights_aboard
+from telemetry.flight.fence_kinds import KindsSeen
+from telemetry.flight.fence_radius import NAMES as RADIUS_NAMES
+from telemetry.flight.fence_radius import circle_aboard, may_have_radius, radius_aboard_m
 from telemetry.mavlink.items import mission_items
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.onboard_lists import Item
 from telemetry.topics.vehicle import VehicleState
 
-CEILING_PARAMETERS = (
-    *("FENCE_ENABLE", "FENCE_AUTOENABLE", "FENCE_TYPE", "FENCE_ALT_MAX", "FENCE_ALT_MAX_TP"),
-    *("GF_ACTION", "GF_MAX_VER_DIST"),
+PARAMETERS = (
+    *("FENCE_ENABLE", "FENCE_AUTOENABLE", "FENCE_TYPE", "FENCE_ALT_MAX", "FENCE_ALT_MIN", "FENCE_ALT_MAX_TP"),
+    *("FENCE_RADIUS", "GF_ACTION", "GF_MAX_VER_DIST", "GF_MAX_HOR_DIST"),
 )
 """ArduPilot's and PX4's: a vehicle has those of one."""
 FIRMWARES: tuple[Firmware, ...] = get_args(Firmware)
@@ -66,6 +70,7 @@ class FenceAboard:
         """Why nobody knows the fence; empty once it is known."""
         self._shapes: tuple[_Shape, ...] = ()
         self._parameters: dict[str, float | None] = {}
+        self.kinds = KindsSeen()
 
     def read_back(self, items: tuple[Item, ...]) -> None:
         try:
@@ -79,8 +84,23 @@ class FenceAboard:
         self.unknown, self._shapes = why, ()
 
     def take(self, parameters: Mapping[str, float | None]) -> None:
-        """Any that were read or written: its ceiling is among them."""
-        self._parameters |= {name: parameters[name] for name in CEILING_PARAMETERS if name in parameters}
+        """Any that were read or written: its ceiling and its circle around home are among them."""
+        self.kinds.take(parameters)
+        self._parameters |= {name: parameters[name] for name in PARAMETERS if name in parameters}
+
+    def unread(self, state: VehicleState | None) -> str:
+        """What its parameters do not tell, in words; empty: its ceiling and its circle around home are known."""
+        told = (each for each in FIRMWARES if is_switched_on(self._parameters, each) is not None)
+        firmware: Firmware | None = next(told, None)
+        if firmware is None:
+            return "What the fence on board does by its parameters (ceiling, circle around home) has not been read"
+        if not are_heights_told(self._parameters, firmware):
+            return "The ceiling of the fence on board has not been read"
+        if may_have_radius(self._parameters, firmware):
+            return "The circle around home of the fence on board has not been read"
+        if radius_aboard_m(self._parameters, firmware) is not None and (state is None or _home(state) is None):
+            return "Home, and with it the circle around it of the fence on board, is not known"
+        return ""
 
     @property
     def highest_m(self) -> float:
@@ -95,16 +115,19 @@ class FenceAboard:
             return ""
         way = [here, *((place.lat_deg, place.lon_deg) for place in places)]
         too_high = self.why_not_at(max(place.alt_rel_home_m for place in places))
-        return too_high or next(filter(None, (self.why_not(here, (a, b, b)) for a, b in pairwise(way))), "")
+        return too_high or next(filter(None, (self.why_not(state, (a, b, b)) for a, b in pairwise(way))), "")
 
     def why_not_at(self, alt_rel_home_m: float) -> str:
         if alt_rel_home_m <= self.highest_m + SAME_M:
             return ""
         return f"It would lead to {alt_rel_home_m:.1f} m; the fence on board allows {self.highest_m:.1f} m above home."
 
-    def why_not(self, here: LatLon, triangle: Sequence[LatLon]) -> str:
-        """``triangle``: everything between three places, the way there included; ``here``: the vehicle."""
-        for shape in self._shapes:
+    def why_not(self, state: VehicleState, triangle: Sequence[LatLon]) -> str:
+        """``triangle``: everything between three places, the way there included; ``state``: of the vehicle."""
+        here = _here(state)
+        if here is None:
+            return ""
+        for shape in (*self._shapes, *self._around(_home(state))):
             away_m = shape.distance_m(triangle)
             if away_m >= self.margin_m:
                 continue
@@ -117,6 +140,14 @@ class FenceAboard:
                 what = f"It would come within {away_m:.1f} m of {shape.name} of the fence on board"
                 return f"{what}; {self.margin_m:.1f} m are kept."
         return ""
+
+    def _around(self, home: LatLon | None) -> tuple[_Shape, ...]:
+        """The circle around the vehicle's home, by parameters."""
+        found: list[_Shape] = []
+        for firmware in FIRMWARES:
+            name = f"the circle around home ({RADIUS_NAMES[firmware]})"
+            found += [_shape(name, each) for each in circle_aboard(self._parameters, firmware, home).circles]
+        return tuple(found)
 
 
 def _shapes(fence: Fence) -> tuple[_Shape, ...]:
@@ -132,3 +163,8 @@ def _shape(name: str, each: FencePolygon | FenceCircle) -> _Shape:
 
 def _here(state: VehicleState) -> LatLon | None:
     return None if state.lat_deg is None or state.lon_deg is None else (state.lat_deg, state.lon_deg)
+
+
+def _home(state: VehicleState) -> LatLon | None:
+    lat_deg, lon_deg = state.home_lat_deg, state.home_lon_deg
+    return None if lat_deg is None or lon_deg is None else (lat_deg, lon_deg)

@@ -11,6 +11,7 @@ from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint, fence_words,
 from planning.formats.fence_items import fence_items, fence_of, rally_items, rally_of
 from telemetry.flight.fence_actions import at_fence, deaf_to_shapes
 from telemetry.flight.fence_heights import NO_FLOOR, SAME_M, are_heights_told, counted_otherwise, heights_aboard
+from telemetry.flight.fence_kinds import SWITCH, untaken_words
 from telemetry.flight.fence_radius import NAMES as RADIUS_NAMES
 from telemetry.flight.fence_radius import may_have_radius, radius_aboard_m
 from telemetry.flight.preflight.checks import Row
@@ -42,9 +43,17 @@ def flown_within(planned: Places, aboard: PlacesOnboard) -> Places:
 
 
 def fence_row(
-    planned: Places, aboard: PlacesOnboard, parameters: Mapping[str, float | None], firmware: Firmware
+    planned: Places,
+    aboard: PlacesOnboard,
+    parameters: Mapping[str, float | None],
+    firmware: Firmware,
+    *,
+    untaken_kinds: int = 0,
 ) -> Row | None:
-    """None: neither the plan nor the vehicle has any. Whether the flight keeps inside is the certificate's matter."""
+    """None: neither the plan nor the vehicle has any. Whether the flight keeps inside is the certificate's matter.
+
+    ``untaken_kinds``: as in VehicleState.
+    """
     wanted = any(planned)
     if aboard.unread:
         text = f"What fence and rally points the vehicle holds could not be read: {aboard.unread}"
@@ -63,6 +72,8 @@ def fence_row(
             return Row("fence", "bad", f"The {what} on board is not the plan's.", "Upload the plan again.")
     does = at_fence(parameters, firmware)
     heights = _with_radius(_heights(planned[0], parameters, firmware), parameters, firmware)
+    if words := untaken_words(untaken_kinds):
+        heights = _Heights((*heights.words, words), f"{heights.mend} {SWITCH}".strip())
     if not wanted and not any(held):
         state = "accept" if heights.mend else "good"
         return Row("fence", state, " ".join((*heights.words, does)), heights.mend) if heights.words else None

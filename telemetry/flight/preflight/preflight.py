@@ -129,7 +129,11 @@ def check(
     shift_m = _shift(home, planned_home, dsm)
     mission = _mission(onboard, firmware, home, dsm)
     planned = (fence, rally)
-    row = None if aboard is None else fence_row(planned, aboard, parameters, firmware)
+    row = (
+        None
+        if aboard is None
+        else fence_row(planned, aboard, parameters, firmware, untaken_kinds=state.fence_kinds_untaken)
+    )
     within = planned if aboard is None or (row is not None and row.state == "bad") else flown_within(planned, aboard)
     kept_to = within_both(within[0], heights_aboard(parameters, firmware))
     around = circle_aboard(parameters, firmware, None if home is None else (home.lat_deg, home.lon_deg))
