@@ -90,10 +90,12 @@ class FenceAboard:
 
     def unread(self, state: VehicleState | None) -> str:
         """What its parameters do not tell, in words; empty: its ceiling and its circle around home are known."""
-        told = (each for each in FIRMWARES if is_switched_on(self._parameters, each) is not None)
-        firmware: Firmware | None = next(told, None)
-        if firmware is None:
-            return "What the fence on board does by its parameters (ceiling, circle around home) has not been read"
+        for firmware in FIRMWARES:
+            if is_switched_on(self._parameters, firmware) is not None:
+                return self._unread_of(firmware, state)
+        return "What the fence on board does by its parameters (ceiling, circle around home) has not been read"
+
+    def _unread_of(self, firmware: Firmware, state: VehicleState | None) -> str:
         if not are_heights_told(self._parameters, firmware):
             return "The ceiling of the fence on board has not been read"
         if may_have_radius(self._parameters, firmware):
