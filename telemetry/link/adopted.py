@@ -292,7 +292,7 @@ class AdoptedVehicle:
             self.is_simulation = bytes(message.flight_custom_version) == SIMULATION
         if message.get_type() in CLOCKED and self._boot.has_restarted(message):
             self._restarted(now_s)
-        if self.onboard.on_message(message, now_s):
+        if self.onboard.on_message(message, now_s, bytewise=self.sends_integers_bytewise):
             self._telling.unsure()
         self._tell_kinds(now_s)
         self._on_heard(self._speech.on_message(message, now_s), now_s)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from telemetry.errors import MissionUnknownError, NotAllowedError
+from telemetry.flight.avoidance.fence_aboard import PARAMETERS as FENCE_PARAMETERS
 from telemetry.flight.avoidance.fence_aboard import FenceAboard
-from telemetry.flight.fence_kinds import NAMES as FENCE_KINDS
 from telemetry.flight.guided.beginning import Steady, why_not_from, why_not_gone_on
 from telemetry.mavlink.actions import Message
 from telemetry.mavlink.autopilot_orders import MISSION_MODES
@@ -102,11 +102,14 @@ class OnBoard:
         self.fence.kinds.forget()
         self.fence.forget("has not been read back since the vehicle was silent or restarted")
 
-    def on_message(self, message: Message, now_s: float) -> bool:
-        """True when this message shows that somebody else has replaced the mission: it is unknown from now on."""
+    def on_message(self, message: Message, now_s: float, *, bytewise: bool = False) -> bool:
+        """True when this message shows that somebody else has replaced the mission: it is unknown from now on.
+
+        ``bytewise``: how the vehicle sends parameters that are integers.
+        """
         kind = message.get_type()
-        if kind == "PARAM_VALUE" and message.param_id in FENCE_KINDS:  # ArduPilot's: no integer comes bytewise
-            self.fence.take({message.param_id: parameter_value(message, bytewise=False)})
+        if kind == "PARAM_VALUE" and message.param_id in FENCE_PARAMETERS:
+            self.fence.take({message.param_id: parameter_value(message, bytewise=bytewise)})
         if self._transferring:
             return False
         if kind == "MISSION_CURRENT":

@@ -10,6 +10,7 @@ from typing import Literal
 
 from planning.errors import FormatError
 from telemetry.errors import NotAllowedError, RefusedError, SilentError, TelemetryError, TransferError
+from telemetry.flight.avoidance.fence_aboard import PARAMETERS as FENCE_PARAMETERS
 from telemetry.link.adopted import AdoptedVehicle
 from telemetry.link.log_reading import INFO, LogReading
 from telemetry.mavlink.actions import Progress
@@ -137,7 +138,9 @@ class Transfers:
             machine = ParameterListRead(target=vehicle.target, bytewise=vehicle.sends_integers_bytewise)
             found = await vehicle.exchanges.run(machine)
         assert isinstance(found, ParameterList)
-        vehicle.onboard.fence.take({each.name: each.value for each in found.parameters})
+        vehicle.onboard.fence.take(
+            dict.fromkeys(FENCE_PARAMETERS) | {each.name: each.value for each in found.parameters}
+        )
         return found
 
     async def _packed_list(self) -> ParameterList | None:

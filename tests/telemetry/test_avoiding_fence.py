@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
 
@@ -11,6 +12,7 @@ from telemetry.errors import NotAllowedError
 from telemetry.flight.avoidance.fence_aboard import FenceAboard
 from telemetry.topics.onboard_lists import Item
 from telemetry.topics.requests import FlyManoeuvre, FlyRest
+from telemetry.topics.vehicle import VehicleState
 from tests.telemetry.avoiding_bench import HOME, ME, NORTH_PER_DEG, Craft, Wall, craft, remaining_at, state, targets
 from tests.telemetry.test_avoiding_aside import craft as followed
 from tests.telemetry.test_avoiding_aside import stands
@@ -125,6 +127,7 @@ def test_a_ceiling_that_does_not_act_or_is_not_known_ends_no_climb(values: dict[
 
 ROUND_HOME: dict[str, float | None] = {
     "FENCE_ENABLE": 1.0, "FENCE_TYPE": 2.0, "FENCE_ALT_MAX": 90.0, "FENCE_ALT_MIN": -10.0, "FENCE_RADIUS": 28.0,
+    "FENCE_AUTOENABLE": None, "FENCE_ALT_MAX_TP": None,
 }  # fmt: skip
 PX4_ROUND_HOME: dict[str, float | None] = {"GF_ACTION": 3.0, "GF_MAX_VER_DIST": 0.0, "GF_MAX_HOR_DIST": 28.0}
 
@@ -173,7 +176,7 @@ def test_a_circle_around_home_that_does_not_act_is_wide_or_not_known_keeps_nobod
     it.avoiding.check_may_fly(request)
     unread = it.avoiding.fence.unread(it.state)
     assert unread == (
-        "The circle around home of the fence on board has not been read" if None in values.values() else ""
+        "Of the fence on board was not read: its circle around home (FENCE_RADIUS)" if None in values.values() else ""
     )
 
 
@@ -219,6 +222,58 @@ def test_a_fence_that_nobody_has_read_is_said_until_it_is() -> None:
     it.avoiding.fence.read_back(())
     assert "(ceiling, circle around home) has not been read" in it.avoiding.status.text
     it.avoiding.fence.take({"FENCE_ENABLE": 0.0})
+    assert "whether it comes on by itself (FENCE_AUTOENABLE)" in it.avoiding.status.text
+    it.avoiding.fence.take({"FENCE_AUTOENABLE": None, "FENCE_TYPE": None})
     assert it.avoiding.status.text == ""
     it.avoiding.fence.read_back(polygon(EXCLUSION, NOTHING_EAST)[:3])
     assert "is not understood: the fence on board, item 1" in it.avoiding.status.text
+
+
+COPTER: dict[str, float | None] = ROUND_HOME | {"FENCE_TYPE": 3.0, "FENCE_ALT_MAX_TP": None}
+HOME_KNOWN = replace(VehicleState(1, 1), home_lat_deg=HOME.lat_deg, home_lon_deg=HOME.lon_deg)
+NOT_READ = "Of the fence on board was not read: "
+
+
+@pytest.mark.parametrize(
+    ("told", "unread"),
+    [
+        (COPTER, ""),
+        (COPTER | {"FENCE_ALT_MIN": None}, ""),  # an old copter has none, and no ceiling needs it
+        (COPTER | {"FENCE_TYPE": 2.0, "FENCE_ALT_MAX": None}, ""),
+        (COPTER | {"FENCE_TYPE": 1.0, "FENCE_RADIUS": None}, ""),
+        (COPTER | {"FENCE_TYPE": 4.0, "FENCE_ALT_MAX": None, "FENCE_RADIUS": math.nan}, ""),
+        (COPTER | {"FENCE_TYPE": None}, f"{NOT_READ}its kinds (FENCE_TYPE)"),
+        (
+            COPTER | {"FENCE_ALT_MAX": None, "FENCE_RADIUS": None},
+            f"{NOT_READ}its ceiling (FENCE_ALT_MAX), its circle around home (FENCE_RADIUS)",
+        ),
+        (
+            COPTER | {"FENCE_ALT_MAX_TP": 0.0},
+            "The ceiling of the fence on board does not count from home (FENCE_ALT_MAX_TP 0)",
+        ),
+        ({"FENCE_ENABLE": 0.0, "FENCE_AUTOENABLE": 0.0}, ""),
+        (
+            {"FENCE_ENABLE": 0.0},
+            f"{NOT_READ}whether it comes on by itself (FENCE_AUTOENABLE), its kinds (FENCE_TYPE)",
+        ),
+        ({"FENCE_ENABLE": 0.0, "FENCE_AUTOENABLE": 3.0}, f"{NOT_READ}its kinds (FENCE_TYPE)"),
+        ({"GF_ACTION": 0.0}, ""),
+        (
+            {"GF_ACTION": 2.0},
+            f"{NOT_READ}its ceiling (GF_MAX_VER_DIST), its circle around home (GF_MAX_HOR_DIST)",
+        ),
+    ],
+)
+def test_it_is_known_once_what_acts_was_told_and_all_that_is_missing_is_named(
+    told: dict[str, float | None], unread: str
+) -> None:
+    fence = FenceAboard()
+    fence.take(told)
+    assert fence.unread(HOME_KNOWN) == unread
+
+
+def test_a_ceiling_that_was_heard_is_not_known_before_what_it_counts_from() -> None:
+    fence = FenceAboard()
+    for name, value in (("FENCE_ENABLE", 1.0), ("FENCE_TYPE", 1.0), ("FENCE_ALT_MAX", 60.0)):
+        fence.take({name: value})
+    assert fence.unread(HOME_KNOWN) == f"{NOT_READ}what its ceiling counts from (FENCE_ALT_MAX_TP)"

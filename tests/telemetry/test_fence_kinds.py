@@ -9,6 +9,7 @@ from planning.fence.fence_model import NO_FENCE, Fence
 from telemetry.flight.fence_kinds import KindsSeen, untaken_words
 from telemetry.flight.preflight.fence_check import fence_row
 from telemetry.link.onboard import OnBoard
+from telemetry.mavlink.parameters.values import wire_value
 from telemetry.topics.onboard_lists import PlacesOnboard
 
 CEILING, CIRCLE, SHAPES, FLOOR = 1, 2, 4, 8
@@ -94,3 +95,29 @@ def test_the_check_says_it_and_wants_it_accepted_though_the_parameters_read_as_s
 def test_nothing_is_said_where_nothing_was_added() -> None:
     assert untaken_words(0) == ""
     assert "(shapes)" in untaken_words(SHAPES)
+
+
+def test_all_of_a_fence_that_is_heard_is_held_against_and_not_its_switch_alone() -> None:
+    aboard = OnBoard()
+    for name, value in (("FENCE_ENABLE", 1), ("FENCE_TYPE", 1), ("FENCE_ALT_MAX", 40), ("FENCE_ALT_MAX_TP", 1)):
+        message = told_by_the_vehicle(name, value)
+        message.param_id = name
+        aboard.on_message(message, 100.0)
+    assert aboard.fence.unread(None) == ""
+    assert aboard.fence.highest_m == 40.0
+
+
+def test_a_px4s_integers_are_heard_as_it_sends_them() -> None:
+    aboard = OnBoard()
+    int32, real32 = 6, 9
+    for name, value, kind in (
+        *(("GF_ACTION", 2, int32), ("GF_MAX_HOR_DIST", 0.0, real32)),
+        ("GF_MAX_VER_DIST", 30.0, real32),
+    ):
+        carried = wire_value(value, kind, bytewise=True)
+        assert carried is not None
+        message = wire.MAVLink_param_value_message(name.encode(), carried, kind, 900, 65535)
+        message.param_id = name
+        aboard.on_message(message, 100.0, bytewise=True)
+    assert aboard.fence.unread(None) == ""
+    assert aboard.fence.highest_m == 30.0

@@ -44,6 +44,9 @@ class Exchanges:
         self.ends[machine].set_exception(next(a.error for a in actions if isinstance(a, Failed)))
 
 
+HERE = VehicleState(1, 1, lat_deg=47.0, lon_deg=8.0)
+
+
 def bench() -> tuple[Transfers, Exchanges, list[TransferStatus]]:
     exchanges, told = Exchanges(), []
     vehicle = SimpleNamespace(firmware="ardupilot", target=(1, 1), exchanges=exchanges, onboard=OnBoard())
@@ -109,18 +112,18 @@ async def _fence_known() -> None:
     exchanges.ends.popitem()[1].set_result(replace(KNOWN, items=FENCE.items))
     await reading
     assert fence.unknown == ""
-    assert fence.why_not((47.0, 8.0), ((47.0, 8.0),) * 3) == ""  # in the middle of its inclusion
+    assert fence.why_not(HERE, ((47.0, 8.0),) * 3) == ""  # in the middle of its inclusion
     fence.margin_m = 60.0
     there = (47.0004, 8.0)
-    assert "leave inclusion circle 1" in fence.why_not((47.0, 8.0), ((47.0, 8.0), (47.0006, 8.0), (47.0006, 8.0)))
-    assert "come within 5.2 m" in fence.why_not((47.0, 8.0), ((47.0, 8.0), there, there))
+    assert "leave inclusion circle 1" in fence.why_not(HERE, ((47.0, 8.0), (47.0006, 8.0), (47.0006, 8.0)))
+    assert "come within 5.2 m" in fence.why_not(HERE, ((47.0, 8.0), there, there))
     sending = asyncio.create_task(transfers.upload_places(replace(FENCE, items=())))
     await asyncio.sleep(0)
     assert "since it was sent" in fence.unknown
     exchanges.ends.popitem()[1].set_result(REPORT)
     await sending
     assert fence.unknown == ""
-    assert fence.why_not((47.0, 8.0), ((47.0, 8.0), there, there)) == ""
+    assert fence.why_not(HERE, ((47.0, 8.0), there, there)) == ""
 
 
 def test_a_file_of_parameters_that_gives_way_to_an_upload_is_not_replaced_by_another_reading() -> None:

@@ -91,7 +91,7 @@ def _fence_words(now: Now, detour: Detour) -> str:
     if unknown := detour.fence.unknown:
         what = "it" if now.fence_unread else "its shapes"
         return f"The fence on board {unknown}: no way of avoidance is held against {what}."
-    return f"{now.fence_unread}: no way of avoidance is held against it." if now.fence_unread else ""
+    return f"{now.fence_unread}: no way of avoidance is held against that." if now.fence_unread else ""
 
 
 def _speed_words(now: Now, sight: Sight, largest_m_s: float) -> str:

@@ -22,11 +22,11 @@ from planning.fence.distance import one_to_polygon, to_circle
 from planning.fence.fence_model import Fence, FenceCircle, FencePolygon, LatLon
 from planning.fence.judge import CIRCLE_SHARE, named_shapes
 from planning.formats.fence_items import fence_of
-from telemetry.flight.fence_actions import is_switched_on
-from telemetry.flight.fence_heights import are_heights_told, heights_aboard
+from telemetry.flight.fence_actions import CEILING_BIT, CIRCLE_BIT, is_switched_on
+from telemetry.flight.fence_heights import ABOVE_HOME, heights_aboard
 from telemetry.flight.fence_kinds import KindsSeen
 from telemetry.flight.fence_radius import NAMES as RADIUS_NAMES
-from telemetry.flight.fence_radius import circle_aboard, may_have_radius, radius_aboard_m
+from telemetry.flight.fence_radius import circle_aboard, radius_aboard_m
 from telemetry.mavlink.items import mission_items
 from telemetry.topics.messages import GuidedTarget
 from telemetry.topics.onboard_lists import Item
@@ -38,6 +38,17 @@ PARAMETERS = (
 )
 """ArduPilot's and PX4's: a vehicle has those of one."""
 FIRMWARES: tuple[Firmware, ...] = get_args(Firmware)
+AUTOENABLE, COUNTED = "FENCE_AUTOENABLE", "FENCE_ALT_MAX_TP"
+"""Not every ArduPilot has them: to be asked and told nothing is to be told."""
+_MEANS = {
+    AUTOENABLE: "whether it comes on by itself",
+    "FENCE_TYPE": "its kinds",
+    "FENCE_ALT_MAX": "its ceiling",
+    COUNTED: "what its ceiling counts from",
+    "FENCE_RADIUS": "its circle around home",
+    "GF_MAX_VER_DIST": "its ceiling",
+    "GF_MAX_HOR_DIST": "its circle around home",
+}
 SAME_M = 0.01
 """Who is nearer than the margin already may go on so near."""
 
@@ -86,7 +97,8 @@ class FenceAboard:
     def take(self, parameters: Mapping[str, float | None]) -> None:
         """Any that were read or written: its ceiling and its circle around home are among them."""
         self.kinds.take(parameters)
-        self._parameters |= {name: parameters[name] for name in PARAMETERS if name in parameters}
+        told = {name: parameters[name] for name in PARAMETERS if name in parameters}
+        self._parameters |= {n: None if v is None or not math.isfinite(v) else v for n, v in told.items()}
 
     def unread(self, state: VehicleState | None) -> str:
         """What its parameters do not tell, in words; empty: its ceiling and its circle around home are known."""
@@ -96,13 +108,41 @@ class FenceAboard:
         return "What the fence on board does by its parameters (ceiling, circle around home) has not been read"
 
     def _unread_of(self, firmware: Firmware, state: VehicleState | None) -> str:
-        if not are_heights_told(self._parameters, firmware):
-            return "The ceiling of the fence on board has not been read"
-        if may_have_radius(self._parameters, firmware):
-            return "The circle around home of the fence on board has not been read"
+        found: list[str] = []
+        if missing := self._missing(firmware):
+            names = ", ".join(f"{_MEANS[name]} ({name})" for name in missing)
+            found.append(f"Of the fence on board was not read: {names}")
+        if self._acts(firmware, CEILING_BIT) and (from_where := self._parameters.get(COUNTED)) not in (
+            None,
+            ABOVE_HOME,
+        ):
+            found.append(f"The ceiling of the fence on board does not count from home ({COUNTED} {from_where:g})")
         if radius_aboard_m(self._parameters, firmware) is not None and (state is None or _home(state) is None):
-            return "Home, and with it the circle around it of the fence on board, is not known"
-        return ""
+            found.append("Home, and with it the circle around it of the fence on board, is not known")
+        return "; ".join(found)
+
+    def _missing(self, firmware: Firmware) -> list[str]:
+        """What has to be told besides to know its ceiling and its circle; only what acts is needed."""
+        told = self._parameters
+        if firmware == "px4":
+            names = ("GF_MAX_VER_DIST", "GF_MAX_HOR_DIST") if told["GF_ACTION"] else ()
+            return [name for name in names if told.get(name) is None]
+        missing: list[str] = []
+        if not is_switched_on(told, firmware):
+            if AUTOENABLE in told:
+                return []
+            missing.append(AUTOENABLE)
+        if told.get("FENCE_TYPE") is None:
+            return [*missing, "FENCE_TYPE"]
+        kinds = int(told["FENCE_TYPE"] or 0)
+        needs = {"FENCE_ALT_MAX": CEILING_BIT, "FENCE_RADIUS": CIRCLE_BIT}
+        missing += [name for name, bit in needs.items() if kinds & bit and told.get(name) is None]
+        return missing + ([COUNTED] if kinds & CEILING_BIT and COUNTED not in told else [])
+
+    def _acts(self, firmware: Firmware, bit: int) -> bool:
+        """Of ArduPilot's kinds."""
+        on = firmware == "ardupilot" and is_switched_on(self._parameters, firmware)
+        return bool(on) and bool(int(self._parameters.get("FENCE_TYPE") or 0) & bit)
 
     @property
     def highest_m(self) -> float:
