@@ -37,7 +37,7 @@ class KindsSeen:
             self.untaken = 0
 
     def forget(self) -> None:
-        """The vehicle restarted, or may have: it takes all of them then."""
+        """The vehicle restarted: it takes all of them then."""
         self.untaken, self._enabled, self._kinds = 0, None, None
 
 

@@ -362,7 +362,7 @@ class AdoptedVehicle:
     def _restarted(self, now_s: float) -> None:
         self._boot, self._speech = BootClock(), Speech(self.target)
         self._ask_anew(now_s)
-        self.onboard.forget()
+        self.onboard.forget(restarted=True)
         self._telling.unsure()
 
     async def _another_state(self) -> None:

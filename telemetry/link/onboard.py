@@ -96,10 +96,11 @@ class OnBoard:
         if mission is not None:
             self.mission = mission
 
-    def forget(self) -> None:
-        """The vehicle restarted, or is another one."""
+    def forget(self, *, restarted: bool = False) -> None:
+        """The vehicle restarted, or may have: which kinds of its fence act is forgotten only where it has."""
         self.mission, self._seen = None, None
-        self.fence.kinds.forget()
+        if restarted:
+            self.fence.kinds.forget()
         self.fence.forget("has not been read back since the vehicle was silent or restarted")
 
     def on_message(self, message: Message, now_s: float, *, bytewise: bool = False) -> bool:

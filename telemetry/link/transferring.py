@@ -192,7 +192,7 @@ class Transfers:
         async with self._writing:
             written = await vehicle.exchanges.run(machine)
         assert isinstance(written, tuple)
-        vehicle.onboard.fence.take({each.name: each.after for each in written})
+        vehicle.onboard.fence.take({each.name: each.after for each in written if each.outcome != "not sent"})
         return written
 
     def _ends(self, known: OnboardMission | None) -> None:

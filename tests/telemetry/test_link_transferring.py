@@ -21,6 +21,7 @@ from telemetry.link.transferring import Transfers
 from telemetry.mavlink.actions import Failed, Progress
 from telemetry.topics.messages import TransferStatus
 from telemetry.topics.onboard_lists import Item, OnboardMission, UploadReport
+from telemetry.topics.parameters import Outcome, ParameterChange, ParameterWritten
 from telemetry.topics.requests import Operator, Upload, UploadPlaces
 from telemetry.topics.vehicle import VehicleState
 
@@ -35,7 +36,7 @@ class Exchanges:
     def __init__(self) -> None:
         self.ends: dict[Any, asyncio.Future[object]] = {}
 
-    async def run(self, machine: Any, *, progress: Any) -> object:
+    async def run(self, machine: Any, *, progress: Any = lambda _: None) -> object:
         self.ends[machine] = asyncio.get_running_loop().create_future()
         progress(Progress("sending", 0, 1))
         return await self.ends[machine]
@@ -156,3 +157,25 @@ async def _file_gives_way() -> None:
         sending.cancel()
         await asyncio.gather(sending, return_exceptions=True)
     assert told == []
+
+
+@pytest.mark.parametrize(("outcome", "is_known"), [("not sent", True), ("unknown", False)])
+def test_a_change_of_the_fence_that_was_not_sent_takes_nothing_from_what_is_known(
+    outcome: Outcome, is_known: bool
+) -> None:
+    asyncio.run(_written(outcome, is_known))
+
+
+async def _written(outcome: Outcome, is_known: bool) -> None:
+    transfers, exchanges, _ = bench()
+    fence = transfers._vehicle.onboard.fence
+    fence.take({"FENCE_ENABLE": 1.0, "FENCE_TYPE": 1.0, "FENCE_ALT_MAX": 60.0, "FENCE_ALT_MAX_TP": None})
+    cast(Any, transfers._vehicle).sends_integers_bytewise = False
+    writing = asyncio.create_task(
+        transfers.write_parameters((ParameterChange("FENCE_ALT_MAX", 90.0),), even_armed=False)
+    )
+    await asyncio.sleep(0)
+    exchanges.ends.popitem()[1].set_result((ParameterWritten("FENCE_ALT_MAX", 90.0, None, None, outcome),))
+    await writing
+    assert (fence.highest_m == 60.0) is is_known
+    assert (fence.unread(None) == "") is is_known

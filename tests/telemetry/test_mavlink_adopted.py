@@ -218,3 +218,22 @@ def test_integers_are_read_as_the_vehicle_says() -> None:
     version = mavlink.MAVLink_autopilot_version_message(16, 0, 0, 0, 0, zeros, zeros, zeros, 0, 0, 0)
     bench.hear(version)
     assert bench.vehicle.sends_integers_bytewise
+
+
+def told(name: str, value: float) -> Any:
+    return mavlink.MAVLink_param_value_message(name.encode(), value, 9, 900, 65535)
+
+
+def test_kinds_of_the_fence_that_may_not_act_are_forgotten_by_a_restart_and_not_by_a_silence() -> None:
+    bench = Bench()
+    bench.hear(heartbeat(), attitude(100_000))
+    bench.hear(told("FENCE_ENABLE", 1), told("FENCE_TYPE", 4), told("FENCE_TYPE", 5))
+    assert bench.vehicle.state.fence_kinds_untaken == 1
+    bench.now_s += 5.0
+    bench.hear(heartbeat(), attitude(105_000))
+    bench.hear(told("FENCE_ENABLE", 1), told("FENCE_TYPE", 5))
+    assert bench.vehicle.state.fence_kinds_untaken == 1
+    for t_boot_ms in (300, 900, 1500):
+        bench.now_s += 0.6
+        bench.hear(attitude(t_boot_ms))
+    assert bench.vehicle.state.fence_kinds_untaken == 0
