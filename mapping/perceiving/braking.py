@@ -42,10 +42,10 @@ class Braking:
         return ramp_m + steady_m + fading_m_s * tau
 
 
-PX4_HOLD = Braking(decel_m_s2=2.6, jerk_m_s3=1.3)
+PX4_HOLD = Braking(decel_m_s2=2.6, jerk_m_s3=1.25)
 """No shorter than PX4's HOLD with its default parameters (MPC_ACC_HOR 3, MPC_JERK_AUTO 4): of the simulated PX4, which
 needs 1.9, 3.8, 6.0, 8.6, 11.4, 15.1 and 21.5 m from 1 to 5, 6.2 and 8 m/s on its way, and wanders up to 0.4 m beyond,
-for it does not stand still where it stops. This law says 0.3 to 3.6 m more."""
+for it does not stand still where it stops. This law says 0.4 to 4.3 m more."""
 _COMPARED_M_S = (0.5, 1.0, 2.0, 3.0, 5.0, 8.0, 12.0)
 
 
