@@ -74,6 +74,8 @@ class Checked:
     """What the vehicle does when it crosses its fence; empty: not read."""
     returns: ReturnSpeeds = field(default_factory=ReturnSpeeds)
     """At which the vehicle comes home."""
+    fence_kinds_untaken: int = 0
+    """As in VehicleState, as they were judged."""
     home_rises_m: float | None = None
     """The vehicle's home above the plan's, whatever was moved since the upload; None: not known."""
 
@@ -130,6 +132,7 @@ def check_start(
         guided_spare_m=None if found.certificate is None else _guided_spare_m(record, found.certificate),
         at_fence=at_fence(parameters, record.firmware),
         returns=return_speeds(parameters, record.firmware),
+        fence_kinds_untaken=state.fence_kinds_untaken,
         home_rises_m=None if found.home_shift_m is None else record.heights_moved_m + found.home_shift_m,
     )
 

@@ -299,7 +299,8 @@ class FlightDesk:
         mission = await self._link.call(Download(operator))
         record = self._aboard.known_record(mission.digest)
         check_firmware(record, state)
-        return await self._work.checked(operator, record, mission, state, rereferenced_m)
+        untaken = lambda: self._state().fence_kinds_untaken  # noqa: E731
+        return await self._work.checked(operator, record, mission, state, rereferenced_m, untaken)
 
     async def _start_request(
         self, operator: Operator, body: StartFlight, record: PlanRecord, ready: Ready

@@ -65,6 +65,8 @@ def check_start(
         raise CheckNeededError(f"The check is {now_mono_s - ready.checked_mono_s:.0f} s old.", advice=_AGAIN)
     if _has_moved(ready.state, state):
         raise CheckNeededError("The vehicle was moved after the check.", advice=_AGAIN)
+    if ready.checked.fence_kinds_untaken != state.fence_kinds_untaken:
+        raise CheckNeededError("Which kinds of the vehicle's fence act has changed since the check.", advice=_AGAIN)
     for row in preflight_now(ready, avoidance, others, utc_minus_mono_s=utc_minus_mono_s).rows:
         if row.state in ("bad", "unknown"):
             raise CheckNeededError(row.text, advice=row.mend or _AGAIN)

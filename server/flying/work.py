@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,10 +49,15 @@ class FlightWork:
         mission: OnboardMission,
         state: VehicleState,
         rereferenced_m: float | None,
+        untaken_kinds: Callable[[], int],
     ) -> Checked:
-        """Judges what was read back, with the vehicle's own return height, fence and rally points."""
+        """Judges what was read back, with the vehicle's own return height, fence and rally points.
+
+        ``untaken_kinds``: of the fence, as the vehicle's state tells them now; reading may have shown some.
+        """
         aboard = await self._aboard(operator)
         parameters = await self._link.call(ReadParameters(NAMES[record.firmware]))
+        state = replace(state, fence_kinds_untaken=untaken_kinds())
         return await self._lane.call(
             check_start, self._directory(record), record, mission, state, parameters, aboard, rereferenced_m
         )
