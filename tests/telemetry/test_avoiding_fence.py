@@ -277,3 +277,30 @@ def test_a_ceiling_that_was_heard_is_not_known_before_what_it_counts_from() -> N
     for name, value in (("FENCE_ENABLE", 1.0), ("FENCE_TYPE", 1.0), ("FENCE_ALT_MAX", 60.0)):
         fence.take({name: value})
     assert fence.unread(HOME_KNOWN) == f"{NOT_READ}what its ceiling counts from (FENCE_ALT_MAX_TP)"
+
+
+@pytest.mark.parametrize(
+    ("way", "is_allowed"),
+    [
+        (((60.0, 0.0), (20.0, 0.0)), True),
+        (((60.0, 0.0), (-20.0, 5.0)), True),  # through the middle, and well inside
+        (((60.0, 0.0), (55.0, 3.0)), True),  # closer, though not inside yet
+        (((60.0, 0.0), (60.0, 0.0)), True),  # where it is
+        (((60.0, 0.0), (61.0, 0.0)), False),
+        (((60.0, 0.0), (58.0, 25.0)), False),  # beside it, farther away at the end
+        (((60.0, 0.0), (-58.0, 0.0)), False),  # out again on the other side
+        (((60.0, 0.0), (-49.0, 0.0)), False),  # and as near to its edge as is not kept
+    ],
+)
+@pytest.mark.parametrize("kept", [ROUND_HOME | {"FENCE_RADIUS": 50.0}, PX4_ROUND_HOME | {"GF_MAX_HOR_DIST": 50.0}])
+def test_beyond_the_circle_around_home_a_way_that_only_comes_closer_is_taken(
+    kept: dict[str, float | None], way: tuple[Corner, Corner], is_allowed: bool
+) -> None:
+    fence = FenceAboard()
+    fence.margin_m = 2.0
+    fence.read_back(())
+    fence.take(kept)
+    begin, end = map(_degrees, way)
+    beyond = replace(HOME_KNOWN, lat_deg=begin[0], lon_deg=begin[1])
+    why = fence.why_not(beyond, (begin, end, end))
+    assert why == "" if is_allowed else "is beyond the circle around home" in why

@@ -71,6 +71,23 @@ class _Shape:
         found = to_circle(triangle_m[None], places_m[0], self.radius_m, inclusion=self.inclusion)
         return float(found.distance_m[0])
 
+    def is_come_back_to(self, here: LatLon, triangle: Sequence[LatLon], margin_m: float) -> bool:
+        """From beyond a circle that is not to be left a way that only comes closer to its middle until it is well
+        inside: every part of the triangle, each of whose edges may be flown."""
+        if self.radius_m is None or not self.inclusion:
+            return False
+        middle = (float(self.lat_lon_deg[0, 0]), float(self.lat_lon_deg[0, 1]))
+        here_m, *places_m = [np.array(offset_m(middle, *place)) for place in (here, *triangle)]
+        if max(float(np.hypot(*place_m)) for place_m in places_m) > float(np.hypot(*here_m)) + SAME_M:
+            return False
+        inside_m = self.radius_m - margin_m
+        ends = ((0, 1), (1, 2), (0, 2))
+        return all(
+            float(np.hypot(*places_m[b])) <= inside_m
+            or float(np.dot(places_m[b] - places_m[a], places_m[b])) <= SAME_M * SAME_M
+            for a, b in ends
+        )
+
 
 class FenceAboard:
     """``margin_m``: how far the vehicle's outermost point may be from where it is said to be."""
@@ -174,6 +191,8 @@ class FenceAboard:
             if away_m >= self.margin_m:
                 continue
             here_m = shape.distance_m((here, here, here))
+            if here_m <= 0.0 and shape.is_come_back_to(here, triangle, self.margin_m):
+                continue
             if here_m <= 0.0:
                 return f"The vehicle is beyond {shape.name} of the fence on board."
             if away_m <= 0.0:
