@@ -22,6 +22,7 @@ from telemetry.flight.fence_actions import (
     at_fence,
     is_switched_on,
 )
+from telemetry.flight.fence_kinds import KINDS
 
 NAMES: dict[Firmware, tuple[str, ...]] = {
     "ardupilot": (
@@ -71,7 +72,7 @@ class HeightChanges:
     """What is to be written so that the vehicle keeps a plan's floor and ceiling, in this order."""
 
     changes: tuple[HeightChange, ...]
-    """None where all is so already. The fence is switched on last, off before where it takes its kinds only then."""
+    """None where all is so already. It is switched on last, off before its kinds where it takes them only then."""
     notes: tuple[str, ...]
     """What this means besides, in whole sentences; ``looser`` first."""
     looser: tuple[str, ...] = ()
@@ -211,12 +212,12 @@ def _ardupilot(
         wanted.append(HeightChange("FENCE_ALT_MAX", _told(parameters, "FENCE_ALT_MAX"), ceiling_m, "m"))
     if floor_m is not None:
         wanted.append(HeightChange("FENCE_ALT_MIN", _told(parameters, "FENCE_ALT_MIN"), floor_m, "m"))
-    wanted.append(HeightChange("FENCE_TYPE", kinds_before, kinds))
     enabled, notes = _told(parameters, "FENCE_ENABLE"), list[str]()
     if enabled == 1 and kinds & ~(kinds_before & ~untaken_kinds) & ~FLOOR_BIT:
         wanted.append(HeightChange("FENCE_ENABLE", enabled, 0))
         enabled = 0.0
-        notes.append(TAKEN_WHEN_SWITCHED)
+        notes += [TAKEN_WHEN_SWITCHED, *_begin_to_act(kinds & untaken_kinds & ~own, parameters)]
+    wanted.append(HeightChange("FENCE_TYPE", kinds_before, kinds))
     wanted.append(HeightChange("FENCE_ENABLE", enabled, 1))
     margin_m = _margin_m(parameters)
     _refuse_unarmable(floor_m, ceiling_m, margin_m, parameters)
@@ -241,6 +242,17 @@ def _ardupilot(
             "The floor acts once the vehicle was above it, and not while it lands; before ArduPilot 4.6 it may not."
         )
     return wanted, notes
+
+
+def _begin_to_act(kinds: int, parameters: Mapping[str, float | None]) -> list[str]:
+    """``kinds``: named while the fence was on, and not the plan's."""
+    notes: list[str] = []
+    for bit, words in KINDS.items():
+        if kinds & bit:
+            name = {CEILING_BIT: "FENCE_ALT_MAX", CIRCLE_BIT: "FENCE_RADIUS"}.get(bit, "")
+            size = "" if not name or parameters.get(name) is None else f" ({name} {parameters[name]:g} m)"
+            notes.append(f"With that the {words}{size} of its fence may begin to act, which FENCE_TYPE names already.")
+    return notes
 
 
 def _refuse_unarmable(

@@ -30,12 +30,11 @@ async def put_heights(link: Asks, operator: Operator, found: HeightChanges) -> t
         return written
     if not all(one.took for one in written):
         return (*written, *_left(switches, "not sent", UNSET))
-    off = ("FENCE_ENABLE", 0)
-    cut = next((number for number, each in enumerate(switches) if (each.name, each.after) == off), None)
+    is_anew = ("FENCE_ENABLE", 0) in [(each.name, each.after) for each in switches]
     try:
-        if cut is None:
+        if not is_anew:
             return (*written, *await _write(link, operator, switches))
-        return (*written, *await _off_and_on(link, operator, switches[: cut + 1], switches[cut + 1 :]))
+        return (*written, *await _off_and_on(link, operator, switches[:-1], switches[-1:]))
     except TelemetryError as error:
         if not written:
             raise
@@ -45,7 +44,7 @@ async def put_heights(link: Asks, operator: Operator, found: HeightChanges) -> t
 async def _off_and_on(
     link: Asks, operator: Operator, off: Sequence[HeightChange], on: Sequence[HeightChange]
 ) -> tuple[ParameterWritten, ...]:
-    """``off``: up to where it is switched off. Whatever becomes of that, it is switched on: perhaps it is off."""
+    """``on`` alone switches it on, whatever becomes of ``off``: perhaps it is off."""
     try:
         written = await _write(link, operator, off)
         await asyncio.sleep(OFF_FOR_S)

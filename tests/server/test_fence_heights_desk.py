@@ -148,7 +148,7 @@ def test_a_fence_that_is_on_is_switched_off_and_on_and_comes_on_whatever_fails_b
         shown = await bench.desk.look()
         assert TAKEN_WHEN_SWITCHED in shown.notes
         assert (await bench.desk.set(ME, SetFenceHeights(changes=shown.changes))).took
-        assert bench.link.took[1:] == [("FENCE_TYPE", 5.0), ("FENCE_ENABLE", 0.0), ("FENCE_ENABLE", 1.0)]
+        assert bench.link.took[1:] == [("FENCE_ENABLE", 0.0), ("FENCE_TYPE", 5.0), ("FENCE_ENABLE", 1.0)]
         bench.link.held |= {"FENCE_TYPE": 4.0, "FENCE_ALT_MAX": 100.0}
         bench.link.took.clear()
         bench.link.fails = {"FENCE_TYPE": RefusedError("No answer.", advice="Look.")}

@@ -19,6 +19,7 @@ from telemetry.flight.fence_heights import (
     heights_aboard,
     highest_return_m,
 )
+from telemetry.flight.fence_kinds import KindsSeen
 from telemetry.flight.preflight.parameters import return_as_flown
 
 COPTER: dict[str, float | None] = {
@@ -73,6 +74,28 @@ def test_a_kind_that_was_named_while_it_was_on_is_not_taken_for_one_that_acts() 
     made = height_changes(BOTH, held, "ardupilot", untaken_kinds=1)
     assert words(made) == ["FENCE_ENABLE 1 -> 0", "FENCE_ENABLE 0 -> 1"]
     assert TAKEN_WHEN_SWITCHED in made.notes
+
+
+def test_setting_it_anew_names_no_kind_while_the_fence_is_on() -> None:
+    """Each that was would be told as one that may not act."""
+    on = COPTER | {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 4.0}
+    made = height_changes(Fence(ceiling_rel_home_m=60.0), on, "ardupilot")
+    assert words(made)[-3:] == ["FENCE_ENABLE 1 -> 0", "FENCE_TYPE 4 -> 5", "FENCE_ENABLE 0 -> 1"]
+    seen = KindsSeen()
+    seen.take(on)
+    for change in made.changes:
+        seen.take({change.name: change.after})
+        assert seen.untaken == 0
+
+
+def test_kinds_that_begin_to_act_besides_the_plans_are_told() -> None:
+    on = COPTER | {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 7.0, "FENCE_RADIUS": 30.0}
+    said = " ".join(height_changes(Fence(ceiling_rel_home_m=60.0), on, "ardupilot", untaken_kinds=7).notes)
+    assert "With that the circle around home (FENCE_RADIUS 30 m) of its fence may begin to act" in said
+    assert "With that the shapes of its fence may begin to act" in said
+    assert "With that the ceiling" not in said, "it is the plan's"
+    untold = " ".join(height_changes(Fence(ceiling_rel_home_m=60.0), on, "ardupilot", untaken_kinds=1).notes)
+    assert "begin to act" not in untold
 
 
 @pytest.mark.parametrize("kinds", [1.0, 5.0])
