@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as wire
 
 from mapping.geometry.arrays import F64
 from telemetry.simulation.simulator.autopilot.px4.unrest import PULL_PER_S, SLIP_M_S, Unrest
+from telemetry.simulation.simulator.protocol.common_streams import CommonStreams
+from tests.telemetry.px4_craft import Px4Craft
 from tests.telemetry.replayed_link import received
+from tests.telemetry.simulator_bench import HOME
 
 STEP_S, GRID_S = 0.01, 0.02
 SMOOTH_S = 0.6
@@ -105,3 +110,20 @@ def test_on_the_ground_nothing_slips() -> None:
     assert made.slip_neu != (0.0, 0.0, 0.0)
     made.rest()
     assert made.slip_neu == (0.0, 0.0, 0.0)
+
+
+def test_the_receiver_tells_the_true_speed_though_the_estimate_slips() -> None:
+    it = Px4Craft((), [], [])
+    bench, pilot = it.bench, it.bench.vehicle.autopilot
+    bench.until(lambda: pilot.position_ok)
+    assert bench.command(400, 1) == 0
+    assert bench.command(22, math.nan, 0, 0, math.nan, math.nan, math.nan, HOME.alt_amsl_m + 20) == 0
+    bench.until(lambda: pilot.mode.name == "HOLD")
+    apart_m_s = []
+    for _ in range(50):
+        bench.advance(0.2)
+        message: Any = CommonStreams(bench.vehicle).build(wire.MAVLINK_MSG_ID_GPS_RAW_INT)
+        told_m_s, true_m_s = message.vel / 100, math.hypot(*bench.vehicle.truth.v_neu[:2])
+        assert told_m_s == pytest.approx(true_m_s, abs=0.006)
+        apart_m_s.append(abs(math.hypot(*pilot.v_neu[:2]) - true_m_s))
+    assert max(apart_m_s) > 0.05, "the estimate slips"

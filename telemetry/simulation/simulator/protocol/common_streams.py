@@ -79,7 +79,7 @@ class CommonStreams:
             return wire.MAVLink_gps_raw_int_message(lost_us, NO_FIX if lost_us else 0, 0, 0, 0, 65535, 65535, 0, 0, 0)
         receiver = self._vehicle.gnss.receiver
         lat, lon, alt_m = self._geodetic(self._vehicle.reported_neu)
-        north, east, _ = self._flown.v_neu
+        north, east, _ = self._vehicle.truth.v_neu  # a receiver knows nothing of the estimate
         return wire.MAVLink_gps_raw_int_message(
             int(self._vehicle.now_s * 1e6),
             FIXES[receiver.fix],
