@@ -57,7 +57,8 @@ def stream(page: Page) -> Stream:
     return Stream(page.context)
 
 
-SLOW_BYTES_PER_S = 4_000
+SLOW_BYTES_PER_S = 200
+"""Less than what is urgent of a vehicle that stands, deflated."""
 
 
 class Line:

@@ -28,7 +28,7 @@ def test_no_change_is_lost_while_the_log_grows_with_the_map(monkeypatch: pytest.
         values = zip(changes.probability.tolist(), changes.explained.tolist(), strict=True)
         followed.update(zip(map(tuple, changes.keys.tolist()), values, strict=True))
         revision = changes.revision
-    assert voxels.blocks.counts[store.LOG_MASK] + 1 == 512
+    assert voxels.blocks.counts[store.LOG_MASK] + 1 == 1024
     assert not any(wholes)
     assert followed == content(voxels)
 
