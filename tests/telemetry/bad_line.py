@@ -45,16 +45,25 @@ class BadLine:
             self._server.close()
 
     async def _serve(self, near_in: asyncio.StreamReader, near_out: asyncio.StreamWriter) -> None:
-        with contextlib.suppress(OSError, asyncio.IncompleteReadError):
-            far_in, far_out = await asyncio.open_connection("127.0.0.1", self._target)
-            ways = [self._carry(near_in, far_out, "up"), self._carry(far_in, near_out, "down")]
-            tasks = [asyncio.ensure_future(way) for way in ways]
-            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-            for task in tasks:
-                task.cancel()
-            await asyncio.gather(*tasks, return_exceptions=True)
-            far_out.close()
-        near_out.close()
+        """Both ends are closed also where the loop ends meanwhile: nobody else would close their sockets."""
+        outs, tasks = [near_out], list[asyncio.Future[None]]()
+        try:
+            with contextlib.suppress(OSError, asyncio.IncompleteReadError):
+                far_in, far_out = await asyncio.open_connection("127.0.0.1", self._target)
+                outs.append(far_out)
+                ways = [self._carry(near_in, far_out, "up"), self._carry(far_in, near_out, "down")]
+                tasks += [asyncio.ensure_future(way) for way in ways]
+                await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+                for task in tasks:
+                    task.cancel()
+                await asyncio.gather(*tasks, return_exceptions=True)
+        except asyncio.CancelledError:
+            for out in outs:
+                out.transport.abort()
+            raise
+        finally:
+            for out in outs:
+                out.close()
 
     async def _carry(self, source: asyncio.StreamReader, sink: asyncio.StreamWriter, way: str) -> None:
         """Read at the line's rate, so that what is too much waits at its sender, as it does on a real line."""
