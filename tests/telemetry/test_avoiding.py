@@ -245,6 +245,23 @@ def test_on_the_far_way_home_it_climbs_over_what_stands_there_and_returns() -> N
     assert it.modes() == [BRAKE, GUIDED, RTL]
 
 
+def test_another_flight_is_told_of_by_its_own_items_from_the_moment_it_brakes() -> None:
+    it = craft(Wall(25, 15))
+    it.until(lambda: it.state.mode == "RTL" and it.avoiding.detour.phase == "idle")
+    it.walls.clear()
+    it.until(lambda: it.truth[0] < 20)
+    it.avoiding.commanded("AUTO", it.now_s)
+    it.bench.command(224, 2)
+    it.bench.command(176, 1, AUTO)
+    it.until(lambda: it.state.mode == "AUTO")
+    flown = remaining_at(it, 2)
+    it.walls.append(Wall(it.truth[0] + 6, 60.0))
+    it.until(lambda: it.avoiding.is_engaged)
+    assert it.avoiding.detour.phase in ("stopping", "taking")
+    assert it.avoiding.flight_status().target == flown.targets[0].item
+    assert it.avoiding.flight_status().targets == flown.targets[-1].item
+
+
 def test_an_order_to_stop_that_nobody_answered_is_given_again_when_the_vehicle_is_heard() -> None:
     it = craft()
     it.until(lambda: it.truth[0] > 8)

@@ -306,7 +306,9 @@ class Detour(DetourState):
         return []
 
     def _let_go(self, _: VehicleState, __: float) -> list[Action]:
+        """What was flown tells nothing of a flight that follows."""
         self._helm.let_go()
+        self.forget()
         return []
 
     def _fly_aside(self, state: VehicleState, now_s: float) -> list[Action]:
