@@ -265,6 +265,8 @@ class FlownLine:
     """That the flight is held against."""
     rally: tuple[RallyPoint, ...] = ()
     """To which the vehicle may fly instead of home."""
+    returns_above_rally: bool = True
+    """PX4 counts the return height from the rally point; ArduPilot returns at the higher one of both heights."""
 
 
 @dataclass(frozen=True, slots=True)

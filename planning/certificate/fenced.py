@@ -34,14 +34,14 @@ def fence_verdict(dsm: Dsm, line: FlownLine, params: ClearanceParams) -> FenceVe
     if not line.fence:
         return None
     home_lat_deg, home_lon_deg = dsm.lat_lon_from_xy(np.array([line.home_xy_m]))[0]
-    # Before a way back begins the line may stand as high as it is; PX4 counts the return height from a rally point.
-    highest_rally_m = max((point.alt_rel_home_m for point in line.rally), default=0.0)
+    rally_m, rtl_m = max((max(0.0, point.alt_rel_home_m) for point in line.rally), default=0.0), params.rtl_height_m
     flight = FencedFlight(
         line_lat_lon_deg=dsm.lat_lon_from_xy(line.points_m[:, :2]),
         line_rel_home_m=line.points_m[:, 2] - line.home_alt_dsm_m,
         home_lat_lon_deg=(float(home_lat_deg), float(home_lon_deg)),
         rally_lat_lon_deg=tuple((point.lat_deg, point.lon_deg) for point in line.rally),
-        return_rel_home_m=params.rtl_height_m + max(0.0, highest_rally_m),
+        # Before a way back begins the line may stand as high as it is.
+        return_rel_home_m=rtl_m + rally_m if line.returns_above_rally else max(rtl_m, rally_m),
         margin_m=params.fence_margin_m,
     )
     return judge_fence(line.fence, flight)

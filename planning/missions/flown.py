@@ -257,4 +257,5 @@ class _Flight:
             notes=tuple(self.notes),
             fence=self.fence,
             rally=self.rally,
+            returns_above_rally=not self.ardupilot,
         )

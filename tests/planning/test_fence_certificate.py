@@ -15,6 +15,7 @@ from planning.certificate.clearance import certify
 from planning.errors import PoiError
 from planning.fence.fence_model import NO_FENCE, Fence, RallyPoint, circle, polygon
 from planning.formats import qgc_plan
+from planning.margins.following_error import Firmware
 from planning.missions.flown import flown_line
 from planning.planner.part import certify_part
 from planning.planner.plan import plan_mission
@@ -27,10 +28,14 @@ FLIGHT = (TAKE_OFF, item(16, 50, 70, 10.0), item(16, 70, 70, 10.0), RTL)
 
 
 def judged(
-    fence: Fence = NO_FENCE, *rally: RallyPoint, dsm: Dsm | None = None, params: ClearanceParams = PARAMS
+    fence: Fence = NO_FENCE,
+    *rally: RallyPoint,
+    dsm: Dsm | None = None,
+    params: ClearanceParams = PARAMS,
+    firmware: Firmware = "ardupilot",
 ) -> Certificate:
     ground = dsm or flat_dsm()
-    mission = Mission(HOME, FLIGHT, fence=fence, rally=rally)
+    mission = Mission(HOME, FLIGHT, fence=fence, rally=rally, firmware=firmware)
     return certify(ground, flown_line(mission, ground), params)
 
 
@@ -77,6 +82,18 @@ def test_a_ceiling_below_the_return_height_is_not_kept() -> None:
     assert codes(certificate) == {"fence"}
     assert certificate_json(certificate)["fence"]["min_distance_m"] is None  # no shapes
     assert codes(judged(Fence(floor_rel_home_m=9.0))) == {"fence"}
+
+
+@pytest.mark.parametrize(("firmware", "highest_m"), [("ardupilot", 20.0), ("px4", 35.0)])
+def test_a_way_to_a_rally_point_is_as_high_below_the_ceiling_as_its_autopilot_flies_it(
+    firmware: Firmware, highest_m: float
+) -> None:
+    """The vehicle may be 1.5 m higher; the return height is 15 m."""
+    rally = RallyPoint(*at(30, 40), 20.0)
+    assert judged(Fence(ceiling_rel_home_m=highest_m + 1.6), rally, firmware=firmware).certified
+    certificate = judged(Fence(ceiling_rel_home_m=highest_m + 1.4), rally, firmware=firmware)
+    assert codes(certificate) == {"fence"}
+    assert f"climbs to {highest_m:.2f} m above home" in certificate.reasons[0].text
 
 
 def test_a_rally_point_on_open_ground_is_fine_and_one_off_the_model_is_not() -> None:
