@@ -157,3 +157,10 @@ export function timecode(value_s: number | null | undefined): string {
   const seconds = String(Math.floor(tenths / 10) % 60).padStart(2, "0");
   return `${Math.floor(tenths / 600)}:${seconds}.${tenths % 10}`;
 }
+
+/** The shortest decimal that a vehicle keeps as this number, in single precision where it is one: 0.8, not 0.800000011920929. */
+export function asSet(value: number): string {
+  if (Math.fround(value) !== value) return String(value);
+  const digits = [1, 2, 3, 4, 5, 6, 7, 8, 9].find((n) => Math.fround(Number(value.toPrecision(n))) === value);
+  return String(digits === undefined ? value : Number(value.toPrecision(digits)));
+}

@@ -157,4 +157,15 @@ describe("flight", () => {
     expect([0, 7.44, 59.99, 187.4].map(f.timecode)).toEqual(["0:00.0", "0:07.4", "0:59.9", "3:07.4"]);
     expect(f.timecode(-3)).toBe("0:00.0");
   });
+
+  it("settings are shown as they were set, and whole numbers whole", () => {
+    expect([Math.fround(0.07), Math.fround(0.8), -1, 9000, 16_777_217, 1 / 3].map(f.asSet)).toEqual([
+      "0.07",
+      "0.8",
+      "-1",
+      "9000",
+      "16777217",
+      String(1 / 3),
+    ]);
+  });
 });

@@ -1,5 +1,6 @@
 import { useState } from "preact/hooks";
 import type { ComparedDoc, ParameterDoc, ParametersDoc } from "../messages";
+import { asSet } from "../format";
 import { checkValue, compared, found, outside, writeParameter } from "../store/parameters";
 import { Button } from "../ui/Button";
 import { Check, TextField } from "../ui/fields";
@@ -78,7 +79,8 @@ function Compared({ made }: { made: ComparedDoc }) {
           <li key={name} class="row wrap">
             <strong>{name}</strong>
             <span>
-              vehicle {here ?? "has none"}, {made.is_vehicle ? "the other" : "file"} {there ?? "has none"}
+              vehicle {here === null ? "has none" : asSet(here)}, {made.is_vehicle ? "the other" : "file"}{" "}
+              {there === null ? "has none" : asSet(there)}
             </span>
             {own && <span class="muted">of one vehicle alone</span>}
             {here !== null && there !== null && !own && (
@@ -88,7 +90,7 @@ function Compared({ made }: { made: ComparedDoc }) {
                 title={whyNotWrite.value ?? ""}
                 onClick={() => void writeParameter(name, there)}
               >
-                Write {there}
+                Write {asSet(there)}
               </Button>
             )}
           </li>
