@@ -256,6 +256,31 @@ def test_a_mission_is_replaced_while_avoidance_is_paused_and_ends_it(leads: bool
     run(whole)
 
 
+@pytest.mark.parametrize(
+    ("leads", "flies", "words"),
+    [(False, True, ""), (True, True, "being led along a way"), (False, False, "being given a command")],
+)
+def test_a_way_that_is_flown_holds_and_one_that_is_flown_now_does_not(leads: bool, flies: bool, words: str) -> None:
+    """What led the vehicle there is under way until something else is ordered."""
+
+    async def whole() -> None:
+        async with desk(heartbeat(custom_mode=GUIDED, base_mode=ARMED), in_air(), POSITION) as it:
+            script: Any = SimpleNamespace(leads=leads, flies=flies, stop=lambda: None)
+            it.pilot._scripting = script  # pyright: ignore[reportPrivateUsage]
+            waiting = asyncio.create_task(it.pilot._procedures.take_over(lambda _: asyncio.sleep(60.0)))  # pyright: ignore[reportPrivateUsage]
+            await until(lambda: it.pilot._procedures.is_under_way)  # pyright: ignore[reportPrivateUsage]
+            if words:
+                with pytest.raises(NotAllowedError, match=words):
+                    it.pilot.check_holds()
+            else:
+                it.pilot.check_holds()
+            it.pilot._procedures.end()  # pyright: ignore[reportPrivateUsage]
+            with pytest.raises(NotAllowedError, match="Another command"):
+                await waiting
+
+    run(whole)
+
+
 def test_the_last_speed_of_each_kind_counts() -> None:
     def speed(kind: float | None, m_s: float | None) -> Item:
         return Item(178, 2, (kind, m_s, -1.0, 0.0), 0.0, 0.0, 0.0)

@@ -148,16 +148,15 @@ def check_may_start(onboard: OnBoard, request: StartAuto) -> None:
         raise NotAllowedError(what, advice="Start it at an item that it has.")
 
 
-def check_holds(state: VehicleState, *, is_led: bool) -> None:
-    """Before what is on board is replaced in flight. ``is_led``: something here still leads the vehicle.
+def check_holds(state: VehicleState, *, led: str) -> None:
+    """Before what is on board is replaced in flight. ``led``: how something here still leads the vehicle, or nothing.
 
     Raises NotAllowedError.
     """
     if not (state.armed and is_in_the_air(state)):
         raise NotAllowedError("The vehicle is not in the air.", advice="Upload the plan and check it.")
-    if is_led or state.mode not in HOLD_MODES.get(state.autopilot, ()):
-        does = "being led past something" if is_led else f"in {state.mode}"
-        what = f"The vehicle does not hold: it is {does}."
+    if led or state.mode not in HOLD_MODES.get(state.autopilot, ()):
+        what = f"The vehicle does not hold: it is {led or f'in {state.mode}'}."
         raise NotAllowedError(what, advice="Hold first: what is on board is replaced only then.")
     if (refusal := why_moves(state, again=PLAN_AGAIN)) is not None:
         raise refusal

@@ -275,8 +275,15 @@ class Pilot:
 
     def check_holds(self) -> None:
         """Raises NotAllowedError unless the vehicle holds in the air, and nothing here leads it."""
-        leads = self._scripting.leads or self.avoidance.leads
-        check_holds(self.vehicle.state, is_led=leads or self._procedures.is_under_way)
+        check_holds(self.vehicle.state, led=self._led())
+
+    def _led(self) -> str:
+        if self.avoidance.leads:
+            return "being led past something"
+        if self._scripting.leads:
+            return "being led along a way"
+        # A way that is flown or paused is under way still, and holds.
+        return "being given a command" if self._procedures.is_under_way and not self._scripting.flies else ""
 
     async def take_up(self, request: TakeUp) -> None:
         self.check_holds()
