@@ -28,7 +28,7 @@ from telemetry.errors import SilentError, TransferError
 from telemetry.mavlink.items import wire_items
 from telemetry.mavlink.verify import as_stored, compare, digest
 from telemetry.topics.checklist import ChecklistRecord
-from telemetry.topics.messages import Candidate, LinkStatus, PlanRecord, Topic
+from telemetry.topics.messages import Candidate, FlightStatus, LinkStatus, PlanRecord, Topic
 from telemetry.topics.onboard_lists import Item, OnboardMission, UploadReport
 from telemetry.topics.requests import Download, DownloadPlaces, Operator, ReadParameters, Upload, UploadPlaces
 from telemetry.topics.vehicle import VehicleState
@@ -150,6 +150,7 @@ class Live:
     def __init__(self, state: VehicleState | None) -> None:
         self._state = state
         self.track = SimpleNamespace(states=[])
+        self.flight = FlightStatus(way="auto", phase="paused")
 
     @property
     def state(self) -> Any:

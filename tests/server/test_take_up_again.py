@@ -71,6 +71,17 @@ def test_after_a_try_that_failed_the_flight_is_still_the_one_that_was_started(pl
     play(scenario)
 
 
+def test_after_a_guided_way_nothing_is_said_of_a_resume(play: Play) -> None:
+    async def scenario(bench: Bench) -> None:
+        bench.live.flight = FlightStatus(way="guided", phase="paused", is_flown=True)
+        px4_plan(bench)
+        with pytest.raises(NotAllowedError) as refused:
+            await bench.desk.take_up(ME, AGAIN)
+        assert refused.value.advice.endswith("The vehicle holds, and the mission before is still on board.")
+
+    play(scenario)
+
+
 def test_what_was_flown_is_left_out_of_the_second_plan_as_well(play: Play) -> None:
     async def scenario(bench: Bench) -> None:
         await bench.desk.take_up(ME, AGAIN)

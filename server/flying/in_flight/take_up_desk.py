@@ -218,7 +218,7 @@ class TakingUp:
         """After something went wrong on the way: read now, not remembered. What Resume does is the link's to say."""
         does, before = self._does(), self._before
         if self._sent == "nothing":
-            return f"{does}, and the mission before is still on board: Resume flies that."
+            return self._as_before(does)
         try:
             found = await self._link.call(Download(operator))
         except TelemetryError as error:
@@ -229,7 +229,11 @@ class TakingUp:
         if self._sent == "places":
             are = "The mission before is still on board, but fence or rally points of the new plan were sent"
             return f"{does}. {are}: Resume is refused. {RETRY}"
-        return f"{does}, and the mission before is still on board: Resume flies that."
+        return self._as_before(does)
+
+    def _as_before(self, does: str) -> str:
+        still = f"{does}, and the mission before is still on board"
+        return f"{still}." if self._live.flight.way == "guided" else f"{still}: Resume flies that."
 
     def _does(self) -> str:
         state = self._live.state
