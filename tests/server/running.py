@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import functools
+import ssl
 import threading
 from collections.abc import Coroutine, Iterator
 from dataclasses import dataclass
@@ -82,7 +84,7 @@ class Running:
 
     def stranger(self, **options: Any) -> httpx.Client:
         """A client without a session."""
-        return httpx.Client(base_url=self.origin, **options)
+        return httpx.Client(base_url=self.origin, verify=_certificates(), **options)
 
 
 def client(origin: str, **options: Any) -> httpx.Client:
@@ -90,8 +92,18 @@ def client(origin: str, **options: Any) -> httpx.Client:
     or a request would now and then be written into one that closes.
     """
     return httpx.Client(
-        base_url=origin, headers={"Origin": origin}, limits=httpx.Limits(keepalive_expiry=2.0), **options
+        base_url=origin,
+        headers={"Origin": origin},
+        limits=httpx.Limits(keepalive_expiry=2.0),
+        verify=_certificates(),
+        **options,
     )
+
+
+@functools.cache
+def _certificates() -> ssl.SSLContext:
+    """Those of the system, read once: each client would read them anew, which takes longer than most tests."""
+    return httpx.create_ssl_context()
 
 
 def _fake_workspace(library: Library, hub: Hub, *_: object) -> Any:
