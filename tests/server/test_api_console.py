@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from tests.server.running import Running, running
@@ -26,8 +27,13 @@ def test_the_api_is_documented_without_foreign_scripts(served: Running) -> None:
     assert "http://" not in page.text
     assert "https://" not in page.text
     assert "script-src 'none'" in page.headers["content-security-policy"]
-    paths = served.http.get("/api/openapi.json").json()["paths"]
+    whole = served.http.get("/api/openapi.json")
+    paths, documents = whole.json()["paths"], whole.json()["components"]["schemas"]
     assert "application/octet-stream" in paths["/api/terrains"]["post"]["requestBody"]["content"]
+    refused = paths["/api/terrains"]["post"]["responses"]["409"]
+    assert refused["description"] == "Conflict"
+    assert refused["content"]["application/json"]["schema"] == {"$ref": "#/components/schemas/ErrorDoc"}
+    assert set(re.findall(r'"#/components/schemas/([^"]+)"', whole.text)) <= set(documents)
 
 
 def test_unknown_paths_and_methods_answer_in_json(served: Running) -> None:
