@@ -39,6 +39,15 @@ def test_navigation_limits_come_in_metres() -> None:
     assert Parameters().axes(1.5).speed_m_s == 1.5
 
 
+def test_navigation_limits_are_those_of_now() -> None:
+    """They are kept between steps of a flight."""
+    parameters = Parameters(WPNAV_SPEED=300)
+    assert [parameters.axes(speed_m_s).speed_m_s for speed_m_s in (None, 2.0, 2.5, None)] == [3.0, 2.0, 2.5, 3.0]
+    parameters.set("WPNAV_SPEED", 400)
+    parameters.set("WPNAV_ACCEL_Z", 150)
+    assert (parameters.axes().speed_m_s, parameters.axes().vertical_accel_m_s2) == (4.0, 1.5)
+
+
 def test_an_unknown_name_is_an_error() -> None:
     with pytest.raises(KeyError):
         Parameters(NO_SUCH=1)

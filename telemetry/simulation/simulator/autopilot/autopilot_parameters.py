@@ -93,6 +93,8 @@ class Parameters:
     def __init__(self, specs: Mapping[str, Spec] = SPECS, /, **changed: float) -> None:
         self.specs = specs
         self._values = {name: spec.default for name, spec in specs.items()}
+        self._axes: tuple[float | None, Axes] | None = None
+        """For the speed that was asked for last: it is, again and again, in every step of a flight."""
         for name, value in changed.items():
             self.set(name, value)
 
@@ -114,15 +116,18 @@ class Parameters:
         if math.isfinite(value):
             kept = min(max(value, spec.low), spec.high)
             self._values[name] = kept if spec.kind == "float" else float(round(kept))
+            self._axes = None
             if name in SAME and SAME[name] in self.specs:
                 self._values[SAME[name]] = self._values[name]
         return self._values[name]
 
     def axes(self, speed_m_s: float | None = None) -> Axes:
         """What navigation may ask for; ``speed_m_s`` replaces WPNAV_SPEED."""
+        if self._axes is not None and self._axes[0] == speed_m_s:
+            return self._axes[1]
         accel_m_s2 = self["WPNAV_ACCEL"] / 100
         corner_m_s2 = self["WPNAV_ACCEL_C"] / 100
-        return Axes(
+        axes = Axes(
             speed_m_s=speed_m_s or self["WPNAV_SPEED"] / 100,
             climb_m_s=self["WPNAV_SPEED_UP"] / 100,
             descent_m_s=self["WPNAV_SPEED_DN"] / 100,
@@ -131,3 +136,5 @@ class Parameters:
             corner_accel_m_s2=corner_m_s2 or 2 * accel_m_s2,
             jerk_m_s3=self["WPNAV_JERK"],
         )
+        self._axes = speed_m_s, axes
+        return axes

@@ -173,7 +173,8 @@ class SimulatedPilot(AnyPilot):
         self.fence = CopterFence(parameters)
 
     def axes(self, speed_m_s: float | None = None) -> Axes:
-        return replace(self.parameters.axes(speed_m_s), **self._vertical_m_s)
+        axes = self.parameters.axes(speed_m_s)
+        return replace(axes, **self._vertical_m_s) if self._vertical_m_s else axes
 
     def forget_speeds(self) -> None:
         """Those that were ordered: the vehicle's own count again."""
