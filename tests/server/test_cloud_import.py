@@ -28,6 +28,7 @@ def imported(root: Path, upload: Path, name: str = "survey.laz", **said: Any) ->
     doc = import_terrain(
         root, upload, name, **{**NOTHING_SAID, **said}, report=lambda stage, share: stages.append(stage)
     )
+    assert isinstance(doc, TerrainDoc)
     return doc, list(dict.fromkeys(stages))
 
 

@@ -91,6 +91,7 @@ def imported(library: Library, upload: Path, **said: Any) -> TerrainDoc:
     doc = import_terrain(
         library.root, upload, "survey.zip", **{**NOTHING_SAID, **said}, report=lambda stage, share: None
     )
+    assert isinstance(doc, TerrainDoc)
     library.refresh()
     assert sorted(path.name for path in upload.parent.glob(f"{upload.stem}-*")) == []
     return doc
@@ -238,9 +239,12 @@ def test_a_terrain_model_is_no_surface_model(library: Library, tmp_path: Path, n
 def test_a_file_that_is_called_a_terrain_model_is_opened_with_a_warning(library: Library, tmp_path: Path) -> None:
     upload = write_raster(tmp_path / "0123abcd.tif", hill())
     said: dict[str, Any] = {**NOTHING_SAID, "report": lambda stage, share: None}
-    (warning,) = import_terrain(library.root, upload, "hill-DTM.tif", **said).warnings
+    named, plain = (import_terrain(library.root, upload, name, **said) for name in ("hill-DTM.tif", "hill-dsm.tif"))
+    assert isinstance(named, TerrainDoc)
+    (warning,) = named.warnings
     assert "hill-DTM.tif is a terrain model (DTM) by its name" in warning
-    assert import_terrain(library.root, upload, "hill-dsm.tif", **said).warnings == []
+    assert isinstance(plain, TerrainDoc)
+    assert plain.warnings == []
     metashape = imported(library, project(tmp_path / "a", {"model": "hill_dem.tif", "photo": "hill_ortho.tif"}))
     assert any("hill_dem.tif: make sure that it was built of all points" in warning for warning in metashape.warnings)
 

@@ -45,7 +45,7 @@ def packed(tmp_path: Path, members: dict[str, bytes]) -> Path:
 
 def imported(root: Path, upload: Path) -> TerrainDoc:
     (root / FOLDER).mkdir(exist_ok=True)
-    return import_terrain(
+    doc = import_terrain(
         root,
         upload,
         "Etna.zip",
@@ -58,6 +58,8 @@ def imported(root: Path, upload: Path) -> TerrainDoc:
         keep_noise=False,
         report=lambda step, share: None,
     )
+    assert isinstance(doc, TerrainDoc)
+    return doc
 
 
 def test_its_tiles_are_one_model(tmp_path: Path, tiles: Path) -> None:
