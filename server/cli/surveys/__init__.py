@@ -1,0 +1,1 @@
+"""``hedgehop survey``: flights over an area, alone or in parts."""
