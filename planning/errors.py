@@ -7,6 +7,7 @@ PlanningError
 │   ├── MissingCrsError        no coordinate reference system: asks for one
 │   └── NoElevationError       every cell is unknown
 ├── PoiError               a point of interest or polygon that cannot be flown
+│   └── NothingLeftError       a survey of whose lines the fence leaves nothing
 ├── ParameterError         a radius, speed or limit that contradicts itself or the terrain
 ├── DatumError             an altitude is asked for in a datum nobody declared
 ├── MissionError           a mission that no vehicle can hold or that cannot be judged
@@ -47,6 +48,10 @@ class NoElevationError(RasterError):
 
 class PoiError(PlanningError):
     code = "poi"
+
+
+class NothingLeftError(PoiError):
+    pass
 
 
 class ParameterError(PlanningError):

@@ -42,6 +42,8 @@ class SurveyPlan:
     """Asked for, between neighbouring lines."""
     front_overlap: float
     """Asked for, between photos of a line."""
+    row_of: tuple[int, ...] = ()
+    """For each start and end in ``pois``: which line they belong to, from 0; one of a concave polygon has several."""
 
 
 def survey_lines(
@@ -72,11 +74,12 @@ def survey_lines(
     trigger_m = along_m * (1 - _overlap("front", front_overlap))
     corners = _corners(polygon_lat_lon, dsm)
     angle = _fewest_turns(corners, widest_m) if angle_deg is None else _finite_angle(angle_deg)
-    turned = corners @ _turn(angle).T
+    turned = corners @ turn(angle).T
     count = _line_count(turned, widest_m)
-    y0_m, y1_m = float(turned[:, 1].min()), float(turned[:, 1].max())
-    spacing_m = (y1_m - y0_m) / count
-    ends = _back_and_forth(turned, np.linspace(y0_m, y1_m, count + 1)) @ _turn(angle)
+    borders_m = strip_borders_m(turned, count)
+    spacing_m = float(borders_m[-1] - borders_m[0]) / count
+    turned_ends, row_of = _back_and_forth(turned, borders_m)
+    ends = turned_ends @ turn(angle)
     _refuse_unknown(ends, dsm)
     return SurveyPlan(
         pois=_pois(ends, dsm),
@@ -89,7 +92,19 @@ def survey_lines(
         polygon_lat_lon_deg=tuple((float(lat), float(lon)) for lat, lon in np.reshape(polygon_lat_lon, (-1, 2))),
         side_overlap=side_overlap,
         front_overlap=front_overlap,
+        row_of=row_of,
     )
+
+
+def turn(angle_deg: float) -> F64:
+    """Rotation (2, 2) that lays a line with this angle clockwise from north along x."""
+    c, s = math.cos(math.radians(90 - angle_deg)), math.sin(math.radians(90 - angle_deg))
+    return np.array([[c, s], [-s, c]])
+
+
+def strip_borders_m(turned_m: F64, lines: int) -> F64:
+    """(L + 1,) y of the borders of the strips that lines along x cover, of corners (N, 2) laid along x."""
+    return np.linspace(float(turned_m[:, 1].min()), float(turned_m[:, 1].max()), lines + 1)
 
 
 def _height(camera: Camera, gsd_cm: float | None, height_m: float | None) -> float:
@@ -137,18 +152,12 @@ def _corners(polygon_lat_lon: F64 | Sequence[tuple[float, float]], dsm: SurfaceM
     return corners
 
 
-def _turn(angle_deg: float) -> F64:
-    """Rotation that lays a line with this angle clockwise from north along x."""
-    c, s = math.cos(math.radians(90 - angle_deg)), math.sin(math.radians(90 - angle_deg))
-    return np.array([[c, s], [-s, c]])
-
-
 def _fewest_turns(corners: F64, widest_m: float) -> float:
     """Direction of the edge along which the fewest lines are needed; of equals the longest edge."""
     edges = np.roll(corners, -1, axis=0) - corners
     angles = np.degrees(np.arctan2(edges[:, 0], edges[:, 1])) % 180.0
     lengths = np.hypot(*edges.T)
-    counts = [_line_count(corners @ _turn(a).T, widest_m, limit=False) for a in angles]
+    counts = [_line_count(corners @ turn(a).T, widest_m, limit=False) for a in angles]
     best = min(range(len(angles)), key=lambda i: (counts[i], -lengths[i]))
     return float(angles[best])
 
@@ -163,14 +172,16 @@ def _line_count(turned: F64, widest_m: float, *, limit: bool = True) -> int:
     return count
 
 
-def _back_and_forth(turned: F64, borders_m: F64) -> F64:
-    """Ends (N, 2) of the lines through the middle of the strips between neighbouring borders."""
+def _back_and_forth(turned: F64, borders_m: F64) -> tuple[F64, tuple[int, ...]]:
+    """Ends (N, 2) of the lines through the middle of the strips between neighbouring borders, each pair's strip."""
     ends: list[tuple[float, float]] = []
+    rows: list[int] = []
     for row, (low, high) in enumerate(pairwise(borders_m.tolist())):
         parts = [_flyable(*part) for part in extents(turned, low, high)]
         xs = [x for part in parts for x in part]
         ends.extend((x, (low + high) / 2) for x in (reversed(xs) if row % 2 else xs))
-    return np.array(ends, dtype=np.float64).reshape(-1, 2)
+        rows += [row] * len(parts)
+    return np.array(ends, dtype=np.float64).reshape(-1, 2), tuple(rows)
 
 
 def _flyable(left_m: float, right_m: float) -> tuple[float, float]:

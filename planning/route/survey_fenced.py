@@ -10,7 +10,7 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from planning.basics.plan_model import Poi
-from planning.errors import PoiError
+from planning.errors import NothingLeftError
 from planning.fence.grown_zones import Flat, flat_shapes
 from planning.fence.home_plane import HomePlane, plane_at
 from planning.route.around_fence import Blocked, Kept, backs_of, blocked_of, longest_way_m
@@ -30,7 +30,7 @@ def fenced_lines(model: SurfaceModel, pois: Sequence[Poi], kept: Kept, *, ways_b
     """Starts and ends of what is left of lines, given as their starts and ends, in the same order.
 
     With ``ways_back`` also what does not see home and every rally point past the fence is left out, if these can be
-    seen at all. Raises PoiError where nothing is left.
+    seen at all. Raises NothingLeftError where nothing is left.
     """
     plane = plane_at(kept.home_lat_lon_deg)
     ends_m, backs_m = plane.xy_m([(poi.lat_deg, poi.lon_deg) for poi in pois]), backs_of(plane, kept)
@@ -45,7 +45,7 @@ def fenced_lines(model: SurfaceModel, pois: Sequence[Poi], kept: Kept, *, ways_b
         line, parts = pois[2 * k : 2 * k + 2], [part for part in each if next(may)]
         left += line if parts == [(0.0, 1.0)] else _ends(plane, line, ends_m[2 * k : 2 * k + 2], parts)
     if not left:
-        raise PoiError(
+        raise NothingLeftError(
             "The fence leaves nothing of the survey: no part of its lines may be flown.",
             advice="Draw the area inside the fence, where home sees it past all that is to be kept out of.",
         )
