@@ -134,8 +134,8 @@ def _nearest_in_leaf(elevation_m, row0, col0, lattice, ax, ay, az, dx, dy, dz, b
 
 
 @njit(cache=True, nogil=True)
-def _nearest(elevation_m, maxima_m, layout, lattice, boxes_m, ax, ay, az, dx, dy, dz):
-    """(squared distance, t) of one segment: depth first, nearer child first."""
+def segment_nearest(elevation_m, maxima_m, layout, lattice, boxes_m, ax, ay, az, dx, dy, dz):
+    """(squared distance, t) of one segment a + t d: depth first, nearer child first."""
     at_start = edge_distance(lattice, elevation_m.shape[0], elevation_m.shape[1], ax, ay)
     at_end = edge_distance(lattice, elevation_m.shape[0], elevation_m.shape[1], ax + dx, ay + dy)
     best_t = 0.0 if at_start <= at_end else 1.0  # the distance to the outside is concave along a line
@@ -178,6 +178,6 @@ def _nearest_all(elevation_m, maxima_m, layout, lattice, boxes_m, start_m, end_m
     for k in prange(start_m.shape[0]):
         d = end_m[k] - start_m[k]
         a = start_m[k]
-        sq, t = _nearest(elevation_m, maxima_m, layout, lattice, boxes_m, a[0], a[1], a[2], d[0], d[1], d[2])
+        sq, t = segment_nearest(elevation_m, maxima_m, layout, lattice, boxes_m, a[0], a[1], a[2], d[0], d[1], d[2])
         distance_m[k] = np.sqrt(sq)
         share[k] = t
