@@ -33,6 +33,8 @@ MOST_LOCAL_WORKERS = 256
 PER_WORKER = 4
 """Pieces on their way for each worker: one in work, the others so that it never waits."""
 _REACH_S, _JOIN_S, _TOLD_EVERY_S = 30.0, 30.0, 0.5
+_START_S = 180.0
+"""On a machine that has much else to do processes take long to come up."""
 _DECIDE = ("numpy", "numba", "scipy", "rasterio", "pyproj")
 _LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
 
@@ -125,19 +127,7 @@ def _client(where: str) -> Iterator[Any]:
     # It logs every connection that closes as it ends.
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     if where == LOCAL or where.startswith(f"{LOCAL}:"):
-        with (
-            distributed.LocalCluster(
-                n_workers=_local_workers(where),
-                threads_per_worker=1,
-                host="127.0.0.1",
-                dashboard_address="127.0.0.1:0",
-                # Whoever reaches a scheduler runs code: other users of this machine have no key to it.
-                security=distributed.Security.temporary(),
-                silence_logs=logging.CRITICAL,
-                env={"NUMBA_NUM_THREADS": "1"},
-            ) as cluster,
-            distributed.Client(cluster) as client,
-        ):
+        with _local(distributed, _local_workers(where)) as cluster, distributed.Client(cluster) as client:
             yield client
         return
     client = distributed.Client.__new__(distributed.Client)
@@ -155,6 +145,29 @@ def _client(where: str) -> Iterator[Any]:
     with client:
         _check_workers(client, where)
         yield client
+
+
+def _local(distributed: Any, workers: int) -> Any:
+    """Processes of this machine. Raises ClusterError when they do not come up."""
+    dask_config = importlib.import_module("dask.config")
+    try:
+        with dask_config.set({"distributed.comm.timeouts.connect": f"{_START_S:g}s"}):
+            return distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",
+                # Whoever reaches a scheduler runs code: other users of this machine have no key to it.
+                security=distributed.Security.temporary(),
+                silence_logs=logging.CRITICAL,
+                env={"NUMBA_NUM_THREADS": "1"},
+            )
+    except (OSError, RuntimeError) as error:
+        raise ClusterError(
+            f"The workers on this machine did not start ({type(error).__name__}: {error}).",
+            where="--cluster",
+            advice="Ask for fewer with local:N, let what else runs here end, or leave --cluster away.",
+        ) from error
 
 
 def _local_workers(where: str) -> int:

@@ -192,6 +192,15 @@ def test_one_scheduler_is_reached_by_tls_with_keys_for_both_sides(tmp_path: Path
         running.close()
 
 
+def test_workers_of_this_machine_that_do_not_start_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    def slow(**asked: object) -> None:
+        raise TimeoutError
+
+    monkeypatch.setattr(distributed, "LocalCluster", slow)
+    with pytest.raises(ClusterError, match=r"did not start \(TimeoutError.*fewer with local:N"):
+        list(spread(_worked_out, [0], "local", lambda share: None))
+
+
 def test_without_dask_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     def absent(name: str) -> None:
         raise ModuleNotFoundError(f"No module named {name!r}")

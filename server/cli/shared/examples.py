@@ -51,10 +51,18 @@ CERTIFY = _examples(
     ("A mission from any ground station", "hedgehop certify dsm.tif mission.plan --position-error-m 0.1"),
     ("Every leg, not only the worst", "hedgehop certify dsm.tif mission.waypoints --verbose"),
 )
+RISK = _examples(
+    ("How likely a flight is to touch the ground", "hedgehop risk dsm.tif flight/mission.plan"),
+    ("Of a hundred thousand flights, on all cores", "hedgehop risk dsm.tif flight/mission.plan --flights 100000 "
+     "--cluster local"),
+    ("With errors that wander less", "hedgehop risk dsm.tif mission.waypoints --correlation-m following=50"),
+)  # fmt: skip
 SURVEY = _examples(
     ("An area at 1 cm per pixel", "hedgehop survey dsm.tif area.geojson --out flight --gsd-cm 1"),
     ("25 m above the surface, lines from west to east", "hedgehop survey dsm.tif area.kml --out flight "
      "--height-m 25 --angle-deg 90"),
+    ("As many flights as the battery asks for, side by side", "hedgehop survey dsm.tif area.geojson --out flights "
+     "--parts auto --cluster local"),
 )  # fmt: skip
 UPLOAD = _examples(
     ("Over a telemetry radio", "hedgehop upload flight/mission.waypoints --link /dev/ttyUSB0:57600"),

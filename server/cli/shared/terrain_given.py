@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from mapping.geometry.arrays import F64
-from planning.errors import ParameterError
+from planning.errors import FormatError, ParameterError
 from planning.planner.part import needed_part
 from planning.terrain.catalogue.joined_models import Catalogue
 from planning.terrain.dsm import Dsm, SurfaceModel
@@ -32,31 +33,50 @@ class OpenedModel:
 
     def say_part(self, part: Dsm) -> None:
         """Spikes of the part that was looked at, once it is known, and the models of a catalogue that it is of."""
-        if isinstance(self.model, Catalogue):
-            say_notes(*share_lines(self.model, part))
-        if not self.spikes_told:
-            _say_spikes(find_spikes(part), removed=False)
+        say_notes(*self.part_notes(part))
+
+    def part_notes(self, part: Dsm) -> list[str]:
+        """What ``say_part`` says."""
+        shares = share_lines(self.model, part) if isinstance(self.model, Catalogue) else []
+        return shares if self.spikes_told else [*shares, *_spike_lines(find_spikes(part), removed=False)]
 
 
-def open_model(path: Path, timer: StepTimer, options: ModelOptions) -> OpenedModel:
-    """Says what is remarkable about it. Where spikes are to be removed, all of it is read: they are told by size."""
+def open_model(path: Path, timer: StepTimer, options: ModelOptions, *, quiet: bool = False) -> OpenedModel:
+    """Says what is remarkable about it, unless ``quiet``: others have said it.
+
+    Where spikes are to be removed, all of it is read: they are told by size.
+    """
+    say = (lambda *notes: None) if quiet else say_notes
     if options.remove_spikes:
-        dsm, made = read_model(path, timer, options)
+        dsm, made = read_model(path, timer, options, say=say)
         return OpenedModel(dsm, made, spikes_told=True)
     timer(READ_STEP, 0.0)
     if is_catalogue(path, options):
         catalogue = open_models_of(path, **_how(options, timer))
         end_progress()
-        say_notes(*catalogue.warnings)
+        say(*catalogue.warnings)
         return OpenedModel(catalogue, _made_of(catalogue), spikes_told=False)
     source = RemoteFile(str(path), load_settings().dsm_urls) if is_address(path) else path
     model = open_dsm(source, **_how(options, timer))
     end_progress()
-    say_notes(*model.warnings)
-    if model.report is not None:
-        _say_spikes(find_spikes(model.whole()), removed=False)
+    say(*model.warnings)
+    if model.report is not None and not quiet:
+        say(*_spike_lines(find_spikes(model.whole()), removed=False))
     made: dict[str, object] = {"model_sha256_of": source.identified_by} if isinstance(source, RemoteFile) else {}
     return OpenedModel(model, made, spikes_told=model.report is not None)
+
+
+@lru_cache(maxsize=1)
+def same_model(path: Path, options: ModelOptions, sha256: str) -> OpenedModel:
+    """As another process opened it and said so; kept. Raises FormatError where another file lies at that path."""
+    opened = open_model(path, StepTimer(), options, quiet=True)
+    if opened.model.sha256 != sha256:
+        raise FormatError(
+            "The surface model here is another one than on the machine that asks.",
+            where=str(path),
+            advice="Put the same file on every worker at the same path.",
+        )
+    return opened
 
 
 def read_around(
@@ -74,7 +94,9 @@ def read_around(
     return part
 
 
-def read_model(path: Path, timer: StepTimer, options: ModelOptions) -> tuple[Dsm, dict[str, object]]:
+def read_model(
+    path: Path, timer: StepTimer, options: ModelOptions, *, say: Callable[..., None] = say_notes
+) -> tuple[Dsm, dict[str, object]]:
     """All of a surface model, and what was done to its heights, for the certificate's assumptions."""
     if is_address(path):
         raise ParameterError(
@@ -84,11 +106,10 @@ def read_model(path: Path, timer: StepTimer, options: ModelOptions) -> tuple[Dsm
         )
     timer(READ_STEP, 0.0)
     if is_catalogue(path, options):
-        return _read_catalogue(path, timer, options)
+        return _read_catalogue(path, timer, options, say)
     dsm, report = read_dsm_reported(path, remove_spikes=options.remove_spikes, **_how(options, timer))
     end_progress()
-    say_notes(*report.warnings)
-    _say_spikes(report.spikes, removed=report.spikes_removed)
+    say(*report.warnings, *_spike_lines(report.spikes, removed=report.spikes_removed))
     return dsm, {"spikes_removed": len(report.spikes)} if report.spikes_removed else {}
 
 
@@ -111,13 +132,14 @@ def share_lines(catalogue: Catalogue, part: Dsm) -> list[str]:
     return [*lines, f"{seam:.0%} of it lies at seams: the higher of the models counts."] if seam else lines
 
 
-def _read_catalogue(path: Path, timer: StepTimer, options: ModelOptions) -> tuple[Dsm, dict[str, object]]:
+def _read_catalogue(
+    path: Path, timer: StepTimer, options: ModelOptions, say: Callable[..., None]
+) -> tuple[Dsm, dict[str, object]]:
     catalogue = open_models_of(path, **_how(options, timer))
     dsm = catalogue.whole()
     end_progress()
-    say_notes(*catalogue.warnings, *share_lines(catalogue, dsm))
     spikes, removed = find_spikes(dsm), options.remove_spikes
-    _say_spikes(spikes, removed=removed)
+    say(*catalogue.warnings, *share_lines(catalogue, dsm), *_spike_lines(spikes, removed=removed))
     made = _made_of(catalogue) | catalogue.said_of_look | ({"spikes_removed": len(spikes)} if removed else {})
     return remove_spikes(dsm, spikes) if removed else dsm, made
 
@@ -140,10 +162,10 @@ def _how(options: ModelOptions, timer: StepTimer) -> dict[str, Any]:
     }
 
 
-def _say_spikes(spikes: Sequence[Spike], *, removed: bool) -> None:
+def _spike_lines(spikes: Sequence[Spike], *, removed: bool) -> list[str]:
     fate = "removed" if removed else "kept as terrain, unless you --remove-spikes"
-    for spike in spikes:
-        say_notes(
-            f"isolated {spike.kind} of {spike.height_m:.1f} m, {spike.size_m:.1f} m wide, "
-            f"at {spike.lat_deg:.7f}, {spike.lon_deg:.7f}: {fate}."
-        )
+    return [
+        f"isolated {spike.kind} of {spike.height_m:.1f} m, {spike.size_m:.1f} m wide, "
+        f"at {spike.lat_deg:.7f}, {spike.lon_deg:.7f}: {fate}."
+        for spike in spikes
+    ]

@@ -27,13 +27,13 @@ def verdict_lines(summary: dict[str, Any]) -> list[str]:
     if detours := summary.get("detours"):
         lines.append(f"  laid around: {_around(detours)}")
     if (survey := summary.get("survey")) is not None:
-        lines.append(f"  photos: {_photos(survey)}")
+        lines.append(f"  photos: {photos_words(survey)}")
     lines += [f"  - {reason['text']} {reason['mend']}" for reason in summary["reasons"]]
     lines += [f"  - {row['text']} {row['mend']}" for row in summary["feasibility"] if row["state"] == "fails"]
     return lines
 
 
-def _photos(survey: dict[str, Any]) -> str:
+def photos_words(survey: dict[str, Any]) -> str:
     """Shares are rounded down, as clearances are."""
     return (
         f"{survey['photos']}, {_percent(survey['photographed_share'])} of {survey['area_m2']:,.0f} m² photographed, "

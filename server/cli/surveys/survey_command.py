@@ -7,21 +7,24 @@ from pathlib import Path
 from typing import Annotated, ClassVar
 
 import numpy as np
+import typer
 from typer import Argument, Option
 
 from planning.errors import ParameterError, PoiError
 from planning.formats.poi_files import read_pois
 from planning.formats.safe_text import clean_name
 from planning.planner.request import PlanRequest, survey_request
-from planning.route.survey import SurveyPlan, survey_lines
+from planning.route.survey import MAX_LINES, SurveyPlan, survey_lines
 from planning.terrain.dsm import SurfaceModel
 from server.cli.shared import options as o
-from server.cli.shared.command import Without, command
+from server.cli.shared.command import DONE, FAILED, Without, command
 from server.cli.shared.fence_given import fence_given
 from server.cli.shared.files_in_out import read_small
 from server.cli.shared.output import say_notes
 from server.cli.shared.planning_run import request_of, run, vehicle_of
+from server.cli.surveys.planned_parts import AUTO, PartsOrder, plan_parts
 from server.schemas.plan_docs import SurveyDoc
+from server.work.cluster import check_where
 
 _SURVEY = SurveyDoc()
 _DEFAULTS = o.PlanOptions(vehicle=o.PlannedVehicle(profile="mapper-rtk"))
@@ -49,11 +52,25 @@ def survey(
     polygon: Annotated[Path, Argument(metavar="POLYGON", help="Area: GeoJSON or KML polygon.")],
     *,
     out: o.Out,
+    parts: Annotated[
+        str | None,
+        Option(
+            metavar="N|auto",
+            help="Plan it in so many parts, each a flight of its own with its own proof; auto: as few as battery and "
+            "items allow.",
+        ),
+    ] = None,
+    cluster: o.Cluster = None,
     as_json: o.AsJson = False,
     pattern: PatternOptions,
     options: Annotated[o.PlanOptions, Without("height_m")] = _DEFAULTS,
 ) -> None:
-    """Plan a back-and-forth survey of an area and prove its clearance."""
+    """Plan a back-and-forth survey of an area and prove its clearance.
+
+    With --parts each part is a certified flight in a folder of its own, from take-off to landing: at --home, or where
+    its own first line begins. --cluster plans the parts side by side.
+    """
+    number = _number(parts, cluster)
     vehicle = vehicle_of(options)
     if vehicle.camera is None:
         raise ParameterError(
@@ -81,7 +98,33 @@ def survey(
         _say_pattern(lines)
         return survey_request(request, lines)
 
-    run(dsm, out, request_for, title=polygon.stem, as_json=as_json, model=options.model)
+    if number is None:
+        run(dsm, out, request_for, title=polygon.stem, as_json=as_json, model=options.model)
+        return
+    order = PartsOrder(dsm, out, options.model, polygon.stem, number, cluster)
+    done = plan_parts(order, request_for, as_json=as_json)
+    raise typer.Exit(DONE if done else FAILED)
+
+
+def _number(parts: str | None, cluster: str | None) -> int | None:
+    """Of parts; ``AUTO``: as many as are needed; None: it is one flight."""
+    if parts is None:
+        if cluster is not None:
+            raise ParameterError(
+                "One flight is planned here.", where="--cluster", advice="Give --parts, or leave --cluster away."
+            )
+        return None
+    if cluster is not None:
+        check_where(cluster)
+    if parts == "auto":
+        return AUTO
+    if not (parts.isascii() and parts.isdigit() and 1 <= int(parts) <= MAX_LINES):
+        raise ParameterError(
+            f"{clean_name(parts)!r} is no number of parts.",
+            where="--parts",
+            advice=f"Give 1 to {MAX_LINES:,}, or auto.",
+        )
+    return int(parts)
 
 
 def _corners(polygon: Path) -> np.ndarray:
