@@ -18,8 +18,11 @@ from planning.following.nearest import follow_track
 from planning.following.reference import reference_line
 from planning.following.surface_distance import SurfaceDistance
 from planning.ground.demo_hillside import small_hill
+from planning.missions.flown import flown_line
 from planning.planner.plan import plan_mission
 from planning.planner.request import PlanRequest
+from planning.risk.flights import fly, risk_ground
+from planning.risk.uncertain import uncertain_of
 from planning.route.around_fence import Kept, laid_legs
 from planning.route.survey_fenced import fenced_lines
 from planning.safe_surface.surface import block_max
@@ -113,6 +116,10 @@ def _follow_a_flight(dsm: Dsm) -> None:
     reference = reference_line(plan.mission, dsm, profile)
     follow_track(reference, reference.points_m)
     SurfaceDistance(dsm).distances_m(reference.points_m)
+    budget = plan.certificate.budget
+    assert budget is not None
+    ground = risk_ground(dsm, flown_line(plan.mission, dsm))
+    fly(ground, uncertain_of(budget, plan.certificate.home), range(1), seed=0)
 
 
 if __name__ == "__main__":

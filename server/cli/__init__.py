@@ -63,6 +63,7 @@ class _Commands(_Lazy):
         "stations": (".door.stations_command.stations", examples.STATIONS),
         "plan": (".plan_command.plan", examples.PLAN),
         "certify": (".judging.certify_command.certify", examples.CERTIFY),
+        "risk": (".judging.risk_command.risk", examples.RISK),
         "survey": (".surveys.survey_command.survey", examples.SURVEY),
         "upload": (".upload_command.upload", examples.UPLOAD),
         "fence": (".places_command.fence", examples.FENCE),

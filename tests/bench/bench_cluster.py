@@ -17,9 +17,21 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+from planning.formats import qgc_plan
+from planning.ground.demo_hillside import demo_dsm, demo_survey_polygon
+from planning.missions.vehicle_profile import load_profile, path_params
+from planning.planner.plan import Plan, plan_mission
+from planning.planner.request import PlanRequest, survey_request
+from planning.risk.flights import RiskGround, risk_ground
+from planning.risk.flights import fly as fly_often
+from planning.risk.uncertain import Uncertain, uncertain_of
+from planning.route.survey import survey_lines
+from planning.route.survey_parts import Lines, part_of
+from planning.terrain.dsm import Dsm
 from server.work.cluster import installed, spread
 from telemetry.simulation.scenarios.catalogue import run_scenario
 from telemetry.simulation.scenarios.stage.result import ScenarioRequest
@@ -28,6 +40,8 @@ from tests.proof.models import GRIDS, seeded
 
 SCENARIO, PIECES = "castle-building", 8
 WAYS = {"here": None, "one worker": "local:1", "two workers": "local:2"}
+SURVEY_M, LINES_PER_PART = 10.0, 2
+"""Height above the surface, and what makes a piece of a survey."""
 NOTHINGS = 300
 NETWORK_BYTES_PER_S = 125e6
 """1 Gbit/s."""
@@ -81,6 +95,39 @@ def proved(kind_seed: tuple[str, int]) -> tuple[float, float] | None:
         prover = Prover(seeded(Path(folder), *kind_seed))
         found = next((each for each in map(prover.prove, range(8)) if each is not None), None)
         return None if found is None else (found.certified_m, found.true_m)
+
+
+@cache
+def _survey() -> tuple[Dsm, PlanRequest]:
+    """Of the demo's hillside, low above it: some 30 lines."""
+    dsm, profile = demo_dsm(), load_profile("mapper-rtk")
+    lines = survey_lines(
+        demo_survey_polygon(), dsm, camera=profile.camera, side_overlap=0.7, front_overlap=0.8, height_m=SURVEY_M
+    )
+    return dsm, survey_request(PlanRequest(pois=(), profile=profile, path=path_params(profile)), lines)
+
+
+def part_planned(first: int) -> str:
+    """The mission of so many lines of the survey."""
+    return qgc_plan.write_plan(_part_of_survey(Lines(first, first + LINES_PER_PART)).mission)
+
+
+def _part_of_survey(lines: Lines) -> Plan:
+    dsm, request = _survey()
+    assert request.survey is not None
+    return plan_mission(dsm, survey_request(request, part_of(request.survey, dsm, lines)))
+
+
+@cache
+def _flown_ground() -> tuple[RiskGround, Uncertain]:
+    plan = _part_of_survey(Lines(0, LINES_PER_PART))
+    budget = plan.certificate.budget
+    assert budget is not None
+    return risk_ground(plan.dsm, plan.line), uncertain_of(budget, plan.certificate.home)
+
+
+def flown_with_errors(piece: int) -> list[float]:
+    return fly_often(*_flown_ground(), range(100 * piece, 100 * piece + 100), 0).distance_m.tolist()
 
 
 def nothing(number: int) -> int:
@@ -186,6 +233,8 @@ def main() -> None:
     )
     kinds = [(kind, seed) for seed in range(1, count + 1) for kind in GRIDS][:count]
     _told(Study(f"hedgehop scenario {SCENARIO}", fly, range(count)), added)
+    _told(Study("hedgehop survey --parts, two lines each", part_planned, range(0, 2 * count, 2)), added)
+    _told(Study("hedgehop risk, 100 flights each", flown_with_errors, range(count)), added)
     _told(Study("make proof, one mission each", proved, kinds), added)
 
 
