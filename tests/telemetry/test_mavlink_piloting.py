@@ -257,16 +257,20 @@ def test_a_mission_is_replaced_while_avoidance_is_paused_and_ends_it(leads: bool
 
 
 @pytest.mark.parametrize(
-    ("leads", "flies", "words"),
-    [(False, True, ""), (True, True, "being led along a way"), (False, False, "being given a command")],
+    ("phase", "is_over", "words"),
+    [
+        ("paused", False, ""),
+        ("flying", False, "being led along a way"),
+        ("interrupted", True, "being given a command"),
+    ],
 )
-def test_a_way_that_is_flown_holds_and_one_that_is_flown_now_does_not(leads: bool, flies: bool, words: str) -> None:
+def test_a_way_that_is_flown_holds_and_one_that_is_flown_now_does_not(phase: str, is_over: bool, words: str) -> None:
     """What led the vehicle there is under way until something else is ordered."""
 
     async def whole() -> None:
         async with desk(heartbeat(custom_mode=GUIDED, base_mode=ARMED), in_air(), POSITION) as it:
-            script: Any = SimpleNamespace(leads=leads, flies=flies, stop=lambda: None)
-            it.pilot._scripting = script  # pyright: ignore[reportPrivateUsage]
+            script: Any = SimpleNamespace(phase=phase, is_over=is_over, stop=lambda _: None)
+            it.pilot._scripting._script = script  # pyright: ignore[reportPrivateUsage]
             waiting = asyncio.create_task(it.pilot._procedures.take_over(lambda _: asyncio.sleep(60.0)))  # pyright: ignore[reportPrivateUsage]
             await until(lambda: it.pilot._procedures.is_under_way)  # pyright: ignore[reportPrivateUsage]
             if words:

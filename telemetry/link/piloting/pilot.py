@@ -275,15 +275,8 @@ class Pilot:
 
     def check_holds(self) -> None:
         """Raises NotAllowedError unless the vehicle holds in the air, and nothing here leads it."""
-        check_holds(self.vehicle.state, led=self._led())
-
-    def _led(self) -> str:
-        if self.avoidance.leads:
-            return "being led past something"
-        if self._scripting.leads:
-            return "being led along a way"
-        # A way that is flown or paused is under way still, and holds.
-        return "being given a command" if self._procedures.is_under_way and not self._scripting.flies else ""
+        led = "being led past something" if self.avoidance.leads else self._scripting.led
+        check_holds(self.vehicle.state, led=led)
 
     async def take_up(self, request: TakeUp) -> None:
         self.check_holds()

@@ -40,6 +40,13 @@ class Scripting:
         return self._flown is not None and self._flown.phase != "paused"
 
     @property
+    def led(self) -> str:
+        """How this link leads the vehicle; nothing where it does not. A way that is flown or paused holds."""
+        if self.leads:
+            return "being led along a way"
+        return "being given a command" if self._procedures.is_under_way and not self.flies else ""
+
+    @property
     def remaining(self) -> RemainingMission | None:
         """What is left of it, also while it is paused."""
         return None if self._flown is None else RemainingMission(self._flown.left, self._flown.end, "guided")
