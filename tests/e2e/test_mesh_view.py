@@ -35,13 +35,8 @@ def test_a_tileset_is_drawn_on_its_place_and_put_off(station: Station, page_3d: 
     expect(page.get_by_test_id("layer-textured")).to_have_attribute("aria-pressed", "true", timeout=LONG_MS)
     expect(page.get_by_test_id("mesh-drawn")).to_have_text("Mesh: a picture, not certified")
     wait_until(page, lambda: min(_colors(page)) > 5000)
-    mesh = _settled(page)
-    page.get_by_test_id("layer-textured").click()
-    wait_until(page, lambda: _colors(page) == (0, 0))
     # The model stands where the mesh stood: a metre to any side, or up, would leave less in common.
-    wait_until(page, lambda: _in_common(mesh, _silhouette(page)) > 0.985)
-    page.get_by_test_id("layer-textured").click()
-    wait_until(page, lambda: min(_colors(page)) > 5000)
+    wait_until(page, lambda: _in_common(*_mesh_and_model(page)) > 0.985)
     page.get_by_test_id("view-top").click()
     wait_until(page, lambda: _meet_in_the_middle(page))
 
@@ -83,17 +78,15 @@ def _silhouette(page: Page) -> np.ndarray:
     return rgb.max(axis=2) - rgb.min(axis=2) > 35
 
 
-def _settled(page: Page) -> np.ndarray:
-    """What is drawn, once the camera has come to rest: two pictures half a second apart are the same."""
-    pictures = [_silhouette(page)]
-
-    def is_same() -> bool:
-        page.wait_for_timeout(500)
-        pictures.append(_silhouette(page))
-        return _in_common(*pictures[-2:]) > 0.9999
-
-    wait_until(page, is_same)
-    return pictures[-1]
+def _mesh_and_model(page: Page) -> tuple[np.ndarray, np.ndarray]:
+    """What is drawn of each, one after the other: alike once the camera has come to rest, however late that is."""
+    mesh = _silhouette(page)
+    page.get_by_test_id("layer-textured").click()
+    wait_until(page, lambda: _colors(page) == (0, 0))
+    model = _silhouette(page)
+    page.get_by_test_id("layer-textured").click()
+    wait_until(page, lambda: min(_colors(page)) > 5000)
+    return mesh, model
 
 
 def _in_common(one: np.ndarray, other: np.ndarray) -> float:
