@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
+from telemetry.parameters.files import value_text
 
 State = Literal["bad", "look", "good"]
 """bad: it endangers this flight. look: a person has to decide, or it could not be judged. good: nothing is found."""
@@ -60,18 +60,13 @@ class VehicleSettings:
             name, unit = (entry, 1.0) if isinstance(entry, str) else entry
             value = self.values.get(name)
             if value is not None and math.isfinite(value):
-                return Held(name, _as_set(value), unit)
+                # As it was set: a vehicle tells 0.800000011920929 where that was 0.8.
+                return Held(name, float(value_text(value)), unit)
         return None
 
     def number(self, name: str, default: float) -> float:
         held = self.held(name)
         return default if held is None else held.value
-
-
-def _as_set(value: float) -> float:
-    """The shortest decimal that a vehicle keeps as this: it tells 0.800000011920929 where 0.8 was set."""
-    single = np.float32(value)
-    return float(str(single)) if float(single) == value else value
 
 
 def unread(name: str, what: str) -> Finding:
