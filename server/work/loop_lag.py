@@ -45,7 +45,9 @@ class LoopLag:
         self._late_s: deque[float] = deque(maxlen=round(WINDOW_S / TICK_S))
         self._longest_s, self._longest_utc, self._since_utc = 0.0, "", _utc()
         self._due_s = now_s() + TICK_S
-        self._seen, self._logged_s = "", -_LOG_EVERY_S
+        self.was_at = ""
+        """What the loop was seen at since it is late; empty while it is not, and where it was not seen at anything."""
+        self._logged_s = -_LOG_EVERY_S
         self._work_s, self._longest_work_s = worked_s(), 0.0
 
     @property
@@ -60,8 +62,8 @@ class LoopLag:
         watch = threading.Thread(
             target=self._watch, args=(threading.get_ident(), ended), name="watches the loop", daemon=True
         )
-        self._due_s, self._work_s = self._now_s() + TICK_S, self._worked_s()
         watch.start()
+        self._due_s, self._work_s = self._now_s() + TICK_S, self._worked_s()
         try:
             while True:
                 await asyncio.sleep(max(0.0, self._due_s - self._now_s()))
@@ -80,14 +82,14 @@ class LoopLag:
             self._longest_s, self._longest_utc = late_s, _utc()
         if late_s > LONG_S and now_s - self._logged_s > _LOG_EVERY_S:
             self._logged_s = now_s
-            log.warning("The server's loop was %.0f ms late. It was at: %s.", 1000 * late_s, self._seen or _WAITING)
-        self._seen = ""
+            log.warning("The server's loop was %.0f ms late. It was at: %s.", 1000 * late_s, self.was_at or _WAITING)
+        self.was_at = ""
 
     def _watch(self, loop_thread: int, ended: threading.Event) -> None:
         while not ended.wait(LONG_S / 2):
             if self._now_s() - self._due_s > LONG_S / 2:
                 frame = sys._current_frames().get(loop_thread)
-                self._seen = self._seen or (place_of(frame) if frame else "")
+                self.was_at = self.was_at or (place_of(frame) if frame else "")
 
 
 def place_of(frame: FrameType) -> str:
