@@ -1,0 +1,228 @@
+"""Recordings that are fetched from other stations, one after the other: asked for, written, checked."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Collection
+from dataclasses import dataclass, field
+
+from telemetry.errors import StationsError
+from telemetry.stations.recordings.asked_and_given import (
+    LOOKING,
+    PIECES_AT_ONCE,
+    WHY,
+    NoPiece,
+    PieceGive,
+    PiecesAsk,
+)
+from telemetry.stations.recordings.fetch_folder import FetchFolder, Note, note_of
+from telemetry.stations.recordings.listing import NOT_ANSWERED
+from telemetry.stations.recordings.offering import hashed
+from telemetry.stations.recordings.pieces import Bucket, Pieces
+from telemetry.topics.station_recordings import FetchState, FetchStatus, RecordingThere
+
+MOST_FETCHES = 8
+LOOKS_AGAIN_S, NOT_ANSWERED_S, RATE_OVER_S = 5.0, 20.0, 10.0
+
+
+@dataclass(slots=True)
+class _Fetch:
+    note: Note
+    pieces: Pieces
+    state: FetchState = "waiting"
+    text: str = ""
+    path: str = ""
+    not_before_s: float = 0.0
+    heard_s: float | None = None
+    """When a piece came last, or the first was asked for; None: not since its station is heard."""
+    came: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=64))
+    """Moments, and how many bytes were there."""
+
+
+class Fetching:
+    """Belongs to one event loop; the disk is left to threads. ``turn`` is called some ten times a second, ``run`` is to
+    be running."""
+
+    def __init__(self, folder: FetchFolder) -> None:
+        self._folder = folder
+        self._fetches: dict[str, _Fetch] = {}
+        self._changing = asyncio.Lock()
+        self._ready: deque[tuple[_Fetch, int, bytes]] = deque()
+        self._to_check = asyncio.Event()
+        self.bucket = Bucket(0.0)
+
+    async def run(self) -> None:
+        """Looks at what has come whole, which takes a while for a long one; until cancelled."""
+        while True:
+            await self._to_check.wait()
+            self._to_check.clear()
+            for fetch in [each for each in self._fetches.values() if each.state == "checking"]:
+                await self._check(fetch)
+
+    async def take_up(self) -> None:
+        """What a process before this one has left. Raises StationsError."""
+        for note in (await asyncio.to_thread(self._folder.begun))[:MOST_FETCHES]:
+            have = await asyncio.to_thread(self._folder.have, note)
+            fetch = self._fetches.setdefault(note.sha256, _Fetch(note, Pieces(note.size_bytes, have)))
+            whole = self._folder.whole(note)
+            if await asyncio.to_thread(whole.is_file):
+                fetch.state, fetch.path = "whole", str(whole)
+
+    async def begin(self, station: str, it: RecordingThere) -> None:
+        """One that failed goes on from what is there. Raises StationsError: no room, or too many of them."""
+        async with self._changing:
+            before = self._fetches.get(it.sha256)
+            if before is not None and before.state != "failed":
+                return
+            if before is None and len(self._fetches) >= MOST_FETCHES:
+                raise StationsError(
+                    f"{MOST_FETCHES} recordings are being fetched already.",
+                    advice="Wait until one has come, or cancel one.",
+                )
+            note = note_of(station, it)
+            have = await asyncio.to_thread(self._folder.begin, note)
+            self._fetches.pop(it.sha256, None)
+            self._fetches[it.sha256] = _Fetch(note, Pieces(note.size_bytes, have))
+
+    async def end(self, sha256: str) -> None:
+        """Whatever it has come to. Raises StationsError where the disk keeps it."""
+        async with self._changing:
+            fetch = self._fetches.pop(sha256, None)
+            if fetch is not None:
+                await asyncio.to_thread(self._folder.delete, fetch.note)
+
+    def on_piece(self, station: str, given: PieceGive, now_s: float) -> None:
+        fetch = self._asked_of(station, given.sha256)
+        if fetch is None:
+            return
+        at = fetch.pieces.have
+        try:
+            data = fetch.pieces.on_piece(given.offset, given.data, now_s)
+        except StationsError as error:
+            _fail(fetch, f"What {station} sends is not what was asked for: {error.what} Call its crew.")
+            return
+        fetch.heard_s = now_s
+        fetch.text = ""
+        if data:
+            self._ready.append((fetch, at, data))
+            fetch.came.append((now_s, fetch.pieces.have))
+
+    def on_none(self, station: str, given: NoPiece, now_s: float) -> None:
+        fetch = self._asked_of(station, given.sha256)
+        if fetch is None:
+            return
+        fetch.pieces.forget_asked()
+        fetch.heard_s = now_s
+        if given.why == LOOKING:
+            fetch.not_before_s = now_s + LOOKS_AGAIN_S
+            fetch.text = f"{station} is asked again: {WHY[LOOKING]}."
+            return
+        _fail(fetch, f"{station} does not have it any more: {WHY[given.why]}. Ask for its list anew.")
+
+    async def turn(self, live: Collection[str], now_s: float) -> tuple[str, PiecesAsk] | None:
+        """Whom to ask for what now; ``live``: stations that are heard."""
+        async with self._changing:
+            await self._write()
+            first = next((each for each in self._fetches.values() if each.state in ("waiting", "fetching")), None)
+            for each in self._fetches.values():
+                if each.state == "fetching" and each is not first:
+                    each.state = "waiting"
+            if first is None:
+                return None
+            if first.pieces.is_whole:
+                first.state, first.text = "checking", ""
+                self._to_check.set()
+                return None
+            return self._ask(first, live, now_s)
+
+    def _ask(self, fetch: _Fetch, live: Collection[str], now_s: float) -> tuple[str, PiecesAsk] | None:
+        station = fetch.note.station
+        if station not in live:
+            if fetch.state == "fetching" or not fetch.text:
+                fetch.pieces.forget_asked()
+                fetch.heard_s = None
+            fetch.state = "waiting"
+            fetch.text = f"{station} is not heard: it goes on by itself once it is."
+            self._give_way(fetch)
+            return None
+        if fetch.state == "waiting":
+            fetch.state, fetch.text, fetch.heard_s = "fetching", "", now_s
+        if fetch.heard_s is not None and now_s - fetch.heard_s > NOT_ANSWERED_S:
+            fetch.text = f"{NOT_ANSWERED.format(station=station)} It is asked on."
+        if now_s < fetch.not_before_s:
+            return None
+        offsets = fetch.pieces.due(self.bucket, now_s, PIECES_AT_ONCE)
+        return (station, PiecesAsk(bytes.fromhex(fetch.note.sha256), tuple(offsets))) if offsets else None
+
+    def _give_way(self, fetch: _Fetch) -> None:
+        """One that cannot go on stands behind those that may."""
+        if any(each.state == "waiting" and each is not fetch for each in self._fetches.values()):
+            self._fetches[fetch.note.sha256] = self._fetches.pop(fetch.note.sha256)
+
+    async def _write(self) -> None:
+        while self._ready:
+            fetch, at, data = self._ready.popleft()
+            if fetch.state == "failed" or self._fetches.get(fetch.note.sha256) is not fetch:
+                continue
+            try:
+                await asyncio.to_thread(self._folder.write, fetch.note, at, data)
+            except StationsError as error:
+                _fail(fetch, f"{error.what} {error.advice}")
+
+    async def _check(self, fetch: _Fetch) -> None:
+        note = fetch.note
+        digest = await hashed(self._folder.part(note), note.size_bytes)
+        async with self._changing:
+            if self._fetches.get(note.sha256) is fetch:
+                await self._settle(fetch, digest)
+
+    async def _settle(self, fetch: _Fetch, digest: bytes | None) -> None:
+        note = fetch.note
+        try:
+            if digest is not None and digest.hex() == note.sha256:
+                fetch.path = str(await asyncio.to_thread(self._folder.finish, note))
+                fetch.state = "whole"
+                return
+            await asyncio.to_thread(self._folder.delete, note)
+        except StationsError as error:
+            _fail(fetch, f"{error.what} {error.advice}")
+            return
+        _fail(
+            fetch,
+            f"What came from {note.station} is not {note.name}: its SHA-256 is another one. It was deleted. Fetch it "
+            "again; where that happens again, call its crew.",
+        )
+
+    def _asked_of(self, station: str, sha256: bytes) -> _Fetch | None:
+        """One that goes on, and comes from there."""
+        fetch = self._fetches.get(sha256.hex())
+        return fetch if fetch is not None and fetch.note.station == station and fetch.state == "fetching" else None
+
+    def statuses(self, now_s: float) -> tuple[FetchStatus, ...]:
+        return tuple(
+            FetchStatus(
+                fetch.note.station,
+                fetch.note.it,
+                fetch.state,
+                fetch.pieces.have,
+                _rate(fetch, now_s),
+                fetch.text,
+                fetch.path,
+            )
+            for fetch in self._fetches.values()
+        )
+
+
+def _fail(fetch: _Fetch, text: str) -> None:
+    fetch.state, fetch.text = "failed", text
+
+
+def _rate(fetch: _Fetch, now_s: float) -> float:
+    """Bytes per second, of the last ones."""
+    if fetch.state != "fetching":
+        return 0.0
+    came = [(at_s, have) for at_s, have in fetch.came if now_s - at_s <= RATE_OVER_S]
+    if len(came) < 2:
+        return 0.0
+    return (came[-1][1] - came[0][1]) / max(now_s - came[0][0], 0.1)
