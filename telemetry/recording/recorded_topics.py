@@ -16,7 +16,16 @@ BULKY = MAPS | {Topic.CLOUD_FRAME, Topic.CLOUD_LOOK}
 NOT_REPLAYED = FRAMES | {Topic.RAW, Topic.SERVER, Topic.TRUTH}
 """Frames are for other programs, a replay is no sign of life of a server, truth is for simulated sensors."""
 
-NOT_RECORDED = frozenset({Topic.RECORDER, Topic.REPLAY, Topic.STATIONS_OWN, Topic.STATIONS})
+NOT_RECORDED = frozenset(
+    {
+        Topic.RECORDER,
+        Topic.REPLAY,
+        Topic.STATIONS_OWN,
+        Topic.STATIONS,
+        Topic.STATIONS_OFFERED,
+        Topic.STATIONS_RECORDINGS,
+    }
+)
 """What recorder and replay say of themselves; vehicles of other stations are recorded there."""
 
 EVENTS = frozenset({Topic.TEXT, Topic.RAW, Topic.COMMAND, Topic.SERVER, Topic.ALERT}) | MAPS | FRAMES

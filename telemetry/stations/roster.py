@@ -84,6 +84,10 @@ class Roster:
     def stations(self, now_s: float, now_utc_s: float) -> tuple[OtherStation, ...]:
         return tuple(self._others[name].told(now_s, now_utc_s) for name in sorted(self._others))
 
+    def live(self, now_s: float) -> set[str]:
+        """Stations that are heard."""
+        return {name for name, other in self._others.items() if now_s - other.heard_s < LOST_S}
+
     def vehicles(self, now_s: float) -> tuple[OtherVehicle, ...]:
         return tuple(each for name in sorted(self._others) for each in self._others[name].vehicles(now_s))
 

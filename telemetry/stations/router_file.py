@@ -1,7 +1,8 @@
 """The router's whole configuration as one file, for ``zenohd -c`` or for Zenoh's own router in a test.
 
 Mutual TLS, and access control by the name in each client's certificate: a station hears all and puts below its own name
-only; queries, deletions, liveliness and the router's administration are refused to everybody.
+only; of recordings it hears what is meant for it alone; queries, deletions, liveliness and the router's administration
+are refused to everybody.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+from telemetry.stations.recordings import asked_and_given as recordings
 from telemetry.stations.station_names import EVERYTHING, MOST_STATIONS, below
 
 _SESSIONS = 2 * MOST_STATIONS
@@ -57,19 +59,33 @@ def router_file(
 
 def access_control(stations: Sequence[str]) -> dict[str, Any]:
     """What is not allowed here is denied. Of several certificates each has its own name."""
-    hear, deliver = "stations-hear", "stations-deliver"
+    hear, deliver, wanted = "stations-hear", "stations-deliver", "recordings-wanted"
     rules = [
         _rule(hear, "ingress", ["declare_subscriber"], EVERYTHING),
         _rule(deliver, "egress", ["put", "declare_subscriber"], EVERYTHING),
-        *(_rule(f"tell-{name}", "ingress", ["put"], below(name)) for name in stations),
+        _rule(wanted, "egress", ["declare_subscriber"], f"{recordings.ROOT}/**"),
+        *(rule for name in stations for rule in _own_rules(name)),
     ]
     return {
         "enabled": True,
         "default_permission": "deny",
         "rules": rules,
         "subjects": [{"id": name, "cert_common_names": [name]} for name in stations],
-        "policies": [{"rules": [hear, deliver, f"tell-{name}"], "subjects": [name]} for name in stations],
+        "policies": [
+            {"rules": [hear, deliver, wanted, *(rule["id"] for rule in _own_rules(name))], "subjects": [name]}
+            for name in stations
+        ],
     }
+
+
+def _own_rules(station: str) -> list[dict[str, Any]]:
+    """What is this one's alone."""
+    return [
+        _rule(f"give-{station}", "ingress", ["put"], recordings.sent_by(station)),
+        _rule(f"want-{station}", "ingress", ["declare_subscriber"], recordings.meant_for(station)),
+        _rule(f"get-{station}", "egress", ["put"], recordings.meant_for(station)),
+        _rule(f"tell-{station}", "ingress", ["put"], below(station)),
+    ]
 
 
 def _rule(name: str, flow: str, messages: list[str], keys: str) -> dict[str, Any]:

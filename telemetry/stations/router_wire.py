@@ -10,12 +10,14 @@ import base64
 import contextlib
 import json
 import threading
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
 import zenoh
 
 from telemetry.errors import StationsError
+from telemetry.stations.recordings.asked_and_given import MESSAGE_BYTES, meant_for
 from telemetry.stations.router_file import LEASE_MS
 from telemetry.stations.station_messages import BEACON_BYTES
 from telemetry.stations.station_names import EVERYTHING, MOST_STATIONS, MOST_VEHICLES
@@ -23,6 +25,7 @@ from telemetry.stations.station_proof import Route, read_proof
 
 CONNECT_S = 3.0
 _MOST_WAITING = MOST_STATIONS * (2 * MOST_VEHICLES + 1)
+_MOST_MAIL = 512
 _SETTINGS: dict[str, Any] = {
     "mode": "client",
     "scouting/multicast/enabled": False,
@@ -75,43 +78,69 @@ class Inbox:
         return waiting, refused
 
 
+class Mailbox:
+    """Of messages about recordings each one waits, so many at most: of what is lost there is asked again."""
+
+    def __init__(self, wake: Callable[[], None]) -> None:
+        self._wake = wake
+        self._lock = threading.Lock()
+        self._waiting: deque[tuple[str, bytes, float]] = deque()
+
+    def offer(self, key: str, payload: zenoh.ZBytes | bytes, came_mono_s: float) -> None:
+        with self._lock:
+            if len(payload) > MESSAGE_BYTES or len(self._waiting) >= _MOST_MAIL:
+                return
+            was_empty = not self._waiting
+            self._waiting.append((key, bytes(payload), came_mono_s))
+        if was_empty:
+            self._wake()
+
+    def take(self) -> list[tuple[str, bytes, float]]:
+        """Key, message, and when it came."""
+        with self._lock:
+            waiting, self._waiting = list(self._waiting), deque()
+        return waiting
+
+
 class Wire:
-    """``inbox`` is filled and ``arrived`` set while the session is open. All methods belong to the event loop."""
+    """``inbox`` is filled and ``arrived`` set while the session is open; ``mail`` and ``mail_arrived`` by what is said
+    about recordings to ``station``. All methods belong to the event loop."""
 
-    def __init__(self, session: zenoh.Session, clock: Callable[[], float]) -> None:
-        self._session, self.arrived = session, asyncio.Event()
-        loop = asyncio.get_running_loop()
-
-        def wake() -> None:
-            with contextlib.suppress(RuntimeError):  # the loop has ended
-                loop.call_soon_threadsafe(self.arrived.set)
-
-        self.inbox = inbox = Inbox(wake)
+    def __init__(self, session: zenoh.Session, clock: Callable[[], float], station: str) -> None:
+        self._session, self.arrived, self.mail_arrived = session, asyncio.Event(), asyncio.Event()
+        self.inbox = inbox = Inbox(_waker(self.arrived))
+        self.mail = mail = Mailbox(_waker(self.mail_arrived))
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._subscriber = session.declare_subscriber(
             EVERYTHING,
             lambda sample: inbox.offer(str(sample.key_expr), sample.payload, clock()),
             allowed_origin=zenoh.Locality.REMOTE,
         )
+        self._mail_subscriber = session.declare_subscriber(
+            meant_for(station),
+            lambda sample: mail.offer(str(sample.key_expr), sample.payload, clock()),
+            allowed_origin=zenoh.Locality.REMOTE,
+        )
 
     @classmethod
-    async def open(cls, route: Route, clock: Callable[[], float]) -> Wire:
+    async def open(cls, route: Route, clock: Callable[[], float], station: str) -> Wire:
         """Raises StationsError where no router answers within ``CONNECT_S``, or one of the two refuses the other."""
         opening = asyncio.ensure_future(asyncio.to_thread(_opened, route))
         try:
-            return cls(await asyncio.shield(opening), clock)
+            return cls(await asyncio.shield(opening), clock, station)
         except asyncio.CancelledError:
             with contextlib.suppress(StationsError):
                 await asyncio.to_thread((await opening).close)
             raise
 
-    def put(self, key: str, payload: bytes) -> None:
-        """Never blocks: what finds no room is dropped."""
+    def put(self, key: str, payload: bytes, *, waits: bool = False) -> None:
+        """Never blocks: what finds no room is dropped. ``waits``: all else goes first, here and at the router."""
         publisher = self._publishers.get(key)
         if publisher is None:
             publisher = self._publishers[key] = self._session.declare_publisher(
                 key,
                 congestion_control=zenoh.CongestionControl.DROP,
+                priority=zenoh.Priority.BACKGROUND if waits else zenoh.Priority.DATA,
                 allowed_destination=zenoh.Locality.REMOTE,
             )
         publisher.put(payload)
@@ -121,6 +150,17 @@ class Wire:
 
     async def close(self) -> None:
         await asyncio.to_thread(self._session.close)
+
+
+def _waker(event: asyncio.Event) -> Callable[[], None]:
+    """For Zenoh's threads."""
+    loop = asyncio.get_running_loop()
+
+    def wake() -> None:
+        with contextlib.suppress(RuntimeError):  # the loop has ended
+            loop.call_soon_threadsafe(event.set)
+
+    return wake
 
 
 def _opened(route: Route) -> zenoh.Session:

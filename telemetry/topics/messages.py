@@ -22,6 +22,7 @@ from telemetry.topics.obstacles import (
     PerceptionSettings,
     PerceptionStatus,
 )
+from telemetry.topics.station_recordings import OwnRecordings, RecordingsStatus
 from telemetry.topics.station_vehicles import OwnVehicles, StationsStatus
 from telemetry.topics.tracks import TracksStatus
 from telemetry.topics.traffic import TrafficSettings, TrafficStatus
@@ -67,6 +68,8 @@ class Topic(StrEnum):
     TRAFFIC_SETTINGS = "traffic/settings"  # TrafficSettings, latest wins
     STATIONS_OWN = "stations/own"  # OwnVehicles, latest wins
     STATIONS = "stations/status"  # StationsStatus, latest wins
+    STATIONS_OFFERED = "stations/offered"  # OwnRecordings, latest wins
+    STATIONS_RECORDINGS = "stations/recordings"  # RecordingsStatus, latest wins
     AVOIDANCE = "avoidance/status"  # AvoidanceStatus, latest wins
     TRUTH = "simulator/truth"  # SimTruth, latest wins, 50 Hz
     SERVER = "server/alive"  # ServerAlive, at 1 Hz: what keeps the link node's heartbeat going
@@ -345,6 +348,8 @@ Published = (
     | TrafficSettings
     | OwnVehicles
     | StationsStatus
+    | OwnRecordings
+    | RecordingsStatus
     | AvoidanceStatus
     | SimTruth
 )
@@ -385,6 +390,8 @@ MESSAGE_TYPES: dict[str, type[Published]] = {
     Topic.TRAFFIC_SETTINGS: TrafficSettings,
     Topic.STATIONS_OWN: OwnVehicles,
     Topic.STATIONS: StationsStatus,
+    Topic.STATIONS_OFFERED: OwnRecordings,
+    Topic.STATIONS_RECORDINGS: RecordingsStatus,
     Topic.AVOIDANCE: AvoidanceStatus,
     Topic.TRUTH: SimTruth,
 }

@@ -3,21 +3,34 @@
 from __future__ import annotations
 
 import asyncio
+import base64
+import json
 import subprocess
 import sys
 import time
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+import zenoh
 
 from server.door.certificates import CertificateFiles, now_utc
 from server.door.station_files import ROUTER_FILE, write_station_files
 from telemetry.bus.bus import Bus
 from telemetry.stations.plan_lines import MOST_POINTS, PlanLine, line_id, packed
 from telemetry.topics.messages import ServerAlive, Topic
+from telemetry.topics.station_recordings import (
+    FetchRecording,
+    FetchStatus,
+    OfferedRecording,
+    OwnRecordings,
+    RecordingsRequest,
+    RecordingsStatus,
+    StationRecordings,
+)
 from telemetry.topics.station_vehicles import FleetLine, FleetVehicle, OtherVehicle, OwnVehicles, StationsStatus
 from tests.free_ports import free_port
 
@@ -112,16 +125,31 @@ class FieldStation:
     def __init__(self, name: str, bus: Bus, folder: Path, router: str, *, shown: str, vehicles: int) -> None:
         self.name, self.bus, self._vehicles = name, bus, vehicles
         self.statuses: list[StationsStatus] = []
+        self.offered: OwnRecordings | None = None
+        """Said every 0.2 s, at the time of then."""
+        self.recordings = RecordingsStatus(0.0)
+        self.fetched = folder.parent / f"fetched-{bus.runtime_dir.name}"
         command = [sys.executable, "-m", "telemetry.nodes.stations", "--runtime", str(bus.runtime_dir)]
         command += ["--station", name, "--router", router, "--file", str(folder / f"{shown}.pem")]
+        self._command = [*command, "--fetched", str(self.fetched)]
         self._log = (bus.runtime_dir / "log").open("wb")
-        self.node = subprocess.Popen(command, start_new_session=True, stderr=self._log)
+        self.node = self._started()
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        return subprocess.Popen(self._command, start_new_session=True, stderr=self._log)
+
+    async def start_again(self) -> None:
+        """After its node was killed."""
+        self.node.kill()
+        await asyncio.to_thread(self.node.wait, PATIENCE_S)
+        self.node = self._started()
 
     async def live(self) -> None:
         """Until cancelled."""
         async with asyncio.TaskGroup() as group:
             group.create_task(self._tell())
             group.create_task(self._hear())
+            group.create_task(self._hear_of_recordings())
 
     async def until(self, holds: Callable[[StationsStatus], bool]) -> StationsStatus:
         """The first status from now on of which it holds."""
@@ -144,6 +172,42 @@ class FieldStation:
 
         return await self.until(holds)
 
+    def offer(self, *paths: Path, is_on: bool = True, bytes_per_s: int = 1_000_000) -> None:
+        """From now on; of no files: it fetches at that pace."""
+        offered = tuple(
+            OfferedRecording(str(path), path.name, path.stat().st_size, 1.7e9, 1.7e9 + 60.0, "Vehicle 1", "Ridge")
+            for path in paths
+        )
+        self.offered = OwnRecordings(0.0, is_on, bytes_per_s, offered)
+
+    async def asks(self, request: RecordingsRequest) -> None:
+        await self.bus.call("stations", request, result=type(None), timeout_s=PATIENCE_S)
+
+    async def lists(self, station: str, holds: Callable[[StationRecordings], bool]) -> StationRecordings:
+        """Of that station's recordings, once it holds."""
+        async with asyncio.timeout(PATIENCE_S):
+            while True:
+                for each in self.recordings.stations:
+                    if each.station == station and holds(each):
+                        return each
+                await asyncio.sleep(0.02)
+
+    async def fetch(self, station: str, name: str) -> str:
+        """Asks for one that it lists, and answers with its SHA-256."""
+        listed = await self.lists(station, lambda each: name in {there.name for there in each.recordings})
+        sha256 = next(there.sha256 for there in listed.recordings if there.name == name)
+        await self.asks(FetchRecording(station, sha256))
+        return sha256
+
+    async def fetches(self, holds: Callable[[FetchStatus], bool]) -> FetchStatus:
+        """The first fetch of which it holds."""
+        async with asyncio.timeout(PATIENCE_S):
+            while True:
+                for each in self.recordings.fetches:
+                    if holds(each):
+                        return each
+                await asyncio.sleep(0.02)
+
     def end(self) -> None:
         self.node.kill()
         self.node.wait(timeout=PATIENCE_S)
@@ -153,12 +217,19 @@ class FieldStation:
         while True:
             self.bus.publish(Topic.SERVER, ServerAlive(time.monotonic(), 1))
             self.bus.publish(Topic.STATIONS_OWN, own_vehicles(self._vehicles))
+            if self.offered is not None:
+                self.bus.publish(Topic.STATIONS_OFFERED, replace(self.offered, t_mono_s=time.monotonic()))
             await asyncio.sleep(0.2)
 
     async def _hear(self) -> None:
         async for _, message in self.bus.subscribe(Topic.STATIONS):
             if isinstance(message, StationsStatus):
                 self.statuses.append(message)
+
+    async def _hear_of_recordings(self) -> None:
+        async for _, message in self.bus.subscribe(Topic.STATIONS_RECORDINGS):
+            if isinstance(message, RecordingsStatus):
+                self.recordings = message
 
 
 class Field:
@@ -189,3 +260,16 @@ class Field:
                 living.cancel()
                 await asyncio.wait([living])
                 station.end()
+
+
+def station_session(field: Field, name: str) -> zenoh.Session:
+    """Of that station at the router, by hand."""
+    begin = "-----BEGIN "
+    parts = [begin + part for part in (field.files / f"{name}.pem").read_text().split(begin)[1:]]
+    settings = {"mode": "client", "connect/endpoints": [f"tls/127.0.0.1:{field.port}"]}
+    for what, part in zip(("connect_private_key", "connect_certificate", "root_ca_certificate"), parts, strict=True):
+        settings[f"transport/link/tls/{what}_base64"] = base64.b64encode(part.encode()).decode()
+    config = zenoh.Config()
+    for key, value in {**settings, "transport/link/tls/enable_mtls": True, "scouting/multicast/enabled": False}.items():
+        config.insert_json5(key, json.dumps(value))
+    return zenoh.open(config)

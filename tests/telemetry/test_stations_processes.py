@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import base64
-import json
 import queue
 import signal
 import time
@@ -21,7 +19,7 @@ from telemetry.stations.station_names import vehicle_key
 from telemetry.topics.station_vehicles import FleetVehicle, StationsStatus
 from tests.telemetry.bad_line import Bad
 from tests.telemetry.bus_runs import PATIENCE_S, run, short_folder
-from tests.telemetry.station_fleet import Field, line_of, true_age_s
+from tests.telemetry.station_fleet import Field, line_of, station_session, true_age_s
 from tests.telemetry.stations_bench import ROUND_S, measure
 
 pytestmark = [pytest.mark.xdist_group("real-time"), pytest.mark.slow]
@@ -89,7 +87,7 @@ def test_the_router_lets_nobody_speak_under_anothers_name() -> None:
             )
             assert not any(station.hears_us for station in told.stations)
             # By hand, with a whole message: Charlie's certificate, and Alpha's name, or another one's.
-            with _session(field, "Charlie") as session:
+            with station_session(field, "Charlie") as session:
                 forged = vehicle_wire(FleetVehicle(7, "Forged"), run=5, count=1, now_mono_s=1.0)
                 for name in ("Alpha", "Bravo", "Delta"):
                     session.put(vehicle_key(name, 7), encode(forged))
@@ -147,7 +145,7 @@ def _ask_for_everything(field: Field) -> tuple[set[str], list[str]]:
     came: queue.SimpleQueue[str] = queue.SimpleQueue()
     asked, heard = list[str](), list[str]()
     may = "hedgehop/stations/1/Charlie/beacon"
-    with _session(field, "Bravo") as bravo, _session(field, "Charlie") as charlie:
+    with station_session(field, "Bravo") as bravo, station_session(field, "Charlie") as charlie:
         for keys in ("hedgehop/stations/1/**", "**", "vehicle/**", "link/**"):
             bravo.declare_subscriber(keys, lambda sample: came.put(_said(sample)))
             bravo.declare_queryable(keys, lambda query: asked.append(str(query.key_expr)))
@@ -215,18 +213,6 @@ def _ages_are_true(status: StationsStatus) -> None:
         oldest_s = status.t_mono_s - other.oldest_t_mono_s
         true_s = true_age_s(other, status.t_mono_s)
         assert oldest_s - other.unsure_s - ROUND_S <= true_s <= oldest_s + ROUND_S
-
-
-def _session(field: Field, name: str) -> zenoh.Session:
-    begin = "-----BEGIN "
-    parts = [begin + part for part in (field.files / f"{name}.pem").read_text().split(begin)[1:]]
-    settings = {"mode": "client", "connect/endpoints": [f"tls/127.0.0.1:{field.port}"]}
-    for what, part in zip(("connect_private_key", "connect_certificate", "root_ca_certificate"), parts, strict=True):
-        settings[f"transport/link/tls/{what}_base64"] = base64.b64encode(part.encode()).decode()
-    config = zenoh.Config()
-    for key, value in {**settings, "transport/link/tls/enable_mtls": True, "scouting/multicast/enabled": False}.items():
-        config.insert_json5(key, json.dumps(value))
-    return zenoh.open(config)
 
 
 def _in_folder(whole: object) -> None:
