@@ -54,6 +54,7 @@ from telemetry.errors import (
     RecordingFullError,
     RefusedError,
     SilentError,
+    StationsError,
     TelemetryError,
     TransferError,
 )
@@ -209,6 +210,7 @@ STATUS: dict[type[Exception], int] = {
     RefusedError: 409,
     SilentError: 504,
     TransferError: 502,
+    StationsError: 409,
     RecordingError: 422,
     RecordingFullError: 507,
     BusError: 503,

@@ -9,13 +9,14 @@ from typing import Any
 
 from server.door.alarms import Alarms
 from server.door.hub import Hub
-from server.errors import BadRequestError, NotFoundError
+from server.errors import BadRequestError, NotFoundError, NotReadyError
 from server.flying.apart.airspace import Airspace
 from server.flying.apart.nearness import Nearness
 from server.flying.apart.other_stations import Meeting, OtherStations
 from server.flying.apart.other_vehicles import OtherVehicles
 from server.flying.apart.own_lines import OwnLines
 from server.flying.apart.own_told import fleet_vehicle
+from server.flying.apart.recordings_there import RecordingsThere
 from server.flying.bags.bag_desk import BagDesk
 from server.flying.checklists import Checklists
 from server.flying.recordings import RecordingDesk
@@ -25,7 +26,7 @@ from server.heard.channel import Channel
 from server.heard.present import Present
 from server.heard.relay import Relay
 from server.library import Library
-from server.library.recording_list import RecordingShelf
+from server.library.recording_list import FETCHED, RecordingShelf
 from server.obstacles.replayed import Replayed
 from server.scene.layers.vehicles import actor_of
 from server.schemas import FleetMessage, ServerMessage
@@ -47,9 +48,10 @@ class Fleet:
     """All methods belong to the event loop. Replay and the UWB radar are on the first vehicle's bus."""
 
     def __init__(
-        self, flights: Sequence[Flying], present: Present, shared: Shared, meeting: Meeting | None = None
+        self, flights: Sequence[Flying], present: Present, shared: Shared, settings: Settings | None = None
     ) -> None:
-        """``meeting``: where other stations are met, if they are."""
+        """``settings`` say where other stations are met, if they are, and what those may fetch."""
+        meeting = None if settings is None else _meeting(settings, shared.library)
         self._flights = {flying.number: flying for flying in flights}
         self._present, self._shared = present, shared
         workspace, library, shelf = shared.workspace, shared.library, shared.shelf
@@ -72,6 +74,17 @@ class Fleet:
             meeting, self.first.bus, self.first.nodes, shared.hub, self._own, self._lines.lines
         )
         stations = self._stations
+        self._there: RecordingsThere | None = None
+        if stations is not None and settings is not None:
+            self._there = RecordingsThere(
+                self.first.bus,
+                self.first.nodes,
+                present,
+                self.recordings,
+                lambda: stations.status,
+                is_on=settings.stations_recordings,
+                kb_s=settings.stations_recordings_kb_s,
+            )
         self._nearness = Nearness(
             {flying.number: (flying.name, flying.live) for flying in flights},
             elsewhere=(lambda _: ()) if stations is None else stations.flown,
@@ -113,7 +126,7 @@ class Fleet:
         except BaseException:
             await asyncio.gather(*(flying.close() for flying in flights))
             raise
-        return cls(flights, present, shared, _meeting(settings))
+        return cls(flights, present, shared, settings)
 
     # The vehicles
 
@@ -152,6 +165,15 @@ class Fleet:
         return self.of(int(number))
 
     @property
+    def recordings_there(self) -> RecordingsThere:
+        """Of other stations. Raises NotReadyError where none are met."""
+        if self._there is None:
+            raise NotReadyError(
+                "This station meets no others.", advice="Set stations_router and stations_file, and start it again."
+            )
+        return self._there
+
+    @property
     def any_armed(self) -> bool:
         return any(flying.live.armed for flying in self.flights)
 
@@ -171,6 +193,7 @@ class Fleet:
             *([self._tell(), self._nearness.run(), self._others.run()] if self._has_others else []),
             *([self.first.nodes.no_stations()] if self._stations is None else self._stations.loops(alarms)),
             *([] if self._stations is None else [self._lines.run()]),
+            *([] if self._there is None else self._there.loops()),
             self.recordings.run(),
             self._scenery.run(),
             self._airspace.run(),
@@ -212,7 +235,8 @@ class Fleet:
     def present(self) -> list[ServerMessage]:
         """What a page is told right after its snapshot, whichever vehicle it shows."""
         others = [] if self._stations is None else [self._stations.message()]
-        return [*self._present.messages(), *([self._message] if self._has_others else []), *others]
+        there = [] if self._there is None else [self._there.message()]
+        return [*self._present.messages(), *([self._message] if self._has_others else []), *others, *there]
 
     @property
     def _has_others(self) -> bool:
@@ -244,9 +268,9 @@ class Fleet:
             await asyncio.sleep(TELL_EVERY_S)
 
 
-def _meeting(settings: Settings) -> Meeting | None:
+def _meeting(settings: Settings, library: Library) -> Meeting | None:
     file = settings.stations_file
-    return None if file is None else Meeting(settings.stations_router, file)
+    return None if file is None else Meeting(settings.stations_router, file, library.root / FETCHED / ".parts")
 
 
 def _wanted(settings: Settings, library: Library, demo: bool) -> list[VehicleWanted]:

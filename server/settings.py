@@ -141,6 +141,11 @@ class Settings(BaseSettings):
     (the first that answers is used). Goes with stations_file; without both no station is told or heard of."""
     stations_file: Path | None = None
     """This station's key and certificates, which hedgehop stations makes: they also say its name."""
+    stations_recordings: bool = True
+    """Whether other stations may list and fetch this one's recordings. Those of others can be fetched either way."""
+    stations_recordings_kb_s: Annotated[int, Field(ge=1, le=10_000)] = 8
+    """How many kB of recordings per second go to other stations at most, to all of them together, and how many of
+    theirs come in: behind 256 kbit/s a quarter of the line."""
     demo_vehicles: Annotated[int, Field(ge=1, le=MOST_VEHICLES)] = 1
     """How many simulated vehicles the demo has. Only the first one has sensors."""
     demo_autopilots: DemoAutopilots = ()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Path, Query, Request
 from fastapi.responses import FileResponse, Response
 from pydantic import RootModel
 
@@ -12,9 +12,21 @@ from server.api.access import DONE, ERROR_RESPONSES, All, Fly, InCharge, answer,
 from server.api.terrain_routes import RAW_BODY, FileName
 from server.door.uploads import display_name, stream_to_disk, suffix_of
 from server.library.recording_list import suffix_of_recording
-from server.schemas import BagDoc, BagRecordedDoc, BagRecordingBody, OpenReview, PlayReview, RecordingDoc
+from server.schemas import (
+    BagDoc,
+    BagRecordedDoc,
+    BagRecordingBody,
+    OpenReview,
+    PlayReview,
+    RecordingDoc,
+    RecordingsThereDoc,
+)
 
 router = APIRouter(prefix="/api", tags=["recordings"], responses=ERROR_RESPONSES)
+
+
+StationName = Annotated[str, Path(max_length=24)]
+Sha256 = Annotated[str, Path(pattern="^[0-9a-f]{64}$")]
 
 
 class Recordings(RootModel[list[RecordingDoc]]):
@@ -62,6 +74,28 @@ async def download(recording_id: str, fleet: All) -> Response:
 async def delete(recording_id: str, fleet: All) -> None:
     """409 for the one that is being written."""
     await fleet.recordings.delete(recording_id)
+
+
+@router.get("/stations/recordings", response_model=RecordingsThereDoc)
+async def recordings_there(fleet: All, ask: bool = False) -> Response:
+    """Of other stations, as far as they are listed. ``ask``: has those that are heard asked for lists that are older
+    than 30 s; the stream says when these have come. 409 where no others are met."""
+    if ask:
+        await fleet.recordings_there.look()
+    return answer(fleet.recordings_there.doc())
+
+
+@router.post("/stations/{station}/recordings/{sha256}", **DONE)
+async def fetch_recording(station: StationName, sha256: Sha256, fleet: All) -> None:
+    """Fetches one that is listed, behind all that is told of vehicles; one that failed goes on from what is there."""
+    await fleet.recordings_there.fetch(station, sha256)
+
+
+@router.delete("/stations/{station}/recordings/{sha256}", **DONE)
+async def end_fetch(station: StationName, sha256: Sha256, fleet: All) -> None:
+    """Cancels it and deletes what is there of it, or puts away why it failed."""
+    del station
+    await fleet.recordings_there.end(sha256)
 
 
 @router.post("/review/open", **DONE)

@@ -44,6 +44,16 @@ class RecordingDesk:
             await self._shelf.changed.wait()
             self._shelf.changed.clear()
 
+    @property
+    def root(self) -> Path:
+        """The data directory."""
+        return self._shelf.root
+
+    async def shelved(self) -> list[tuple[Path, RecordingDoc]]:
+        """Each with its file. Raises StorageError."""
+        async with self._listing:
+            return await asyncio.to_thread(self._shelf.shelved)
+
     async def docs(self) -> list[RecordingDoc]:
         async with self._listing:
             return await asyncio.to_thread(self._shelf.docs)
@@ -58,6 +68,14 @@ class RecordingDesk:
             doc = await asyncio.to_thread(self._shelf.add, upload, name)
         finally:
             await asyncio.to_thread(upload.unlink, missing_ok=True)
+        await self.refresh()
+        return doc
+
+    async def add_fetched(self, path: str, name: str, station: str) -> RecordingDoc:
+        """Takes in what came from another station, where it can be read. Raises RecordingError when it holds no flight;
+        the file is left then."""
+        await self._board.run(f"Reading {name}", lambda lane, _: lane.call(review_task.read, Path(path), name))
+        doc = await asyncio.to_thread(self._shelf.add, Path(path), name, station)
         await self.refresh()
         return doc
 

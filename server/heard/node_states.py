@@ -15,6 +15,7 @@ from telemetry.bus.liveness import START_S
 from telemetry.bus.node_lock import running_node, running_nodes
 from telemetry.topics.obstacles import SENSORS, Sensor
 from telemetry.topics.recording_requests import RecorderRequest, ReplayRequest, StartRecording
+from telemetry.topics.station_recordings import RecordingsRequest
 from telemetry.topics.vehicle import RadarKind
 
 LINK, RECORDER, REPLAY, SIMULATOR = "link", "recorder", "replay", "simulator"
@@ -26,6 +27,8 @@ _SENSOR_SEED = 1
 _RETURN_HEIGHT: dict[DemoAutopilot, str] = {"ardupilot": "RTL_ALT={1:.0f}", "px4": "RTL_RETURN_ALT={0:.2f}"}
 """For metres and centimetres above home."""
 _LOOK_AGAIN_S = 0.5
+_APPEARS_S = 3.0
+"""A stations node that is not there is not waited for: its file may be missing."""
 _CALL_TIMEOUT_S = 15.0
 """Of a node that has been up, on a busy machine."""
 
@@ -113,10 +116,15 @@ class Nodes:
         """Moving objects in what the radar sends."""
         await self.supervisor.start(TRACKS, [])
 
-    async def stations(self, name: str, routers: Sequence[str], file: Path) -> None:
-        """Vehicles of other stations, met at a router."""
+    async def stations(self, name: str, routers: Sequence[str], file: Path, fetched: Path) -> None:
+        """Vehicles of other stations, met at a router; ``fetched``: where their recordings lie until they are whole."""
         arguments = [part for router in routers for part in ("--router", router)]
-        await self.supervisor.start(STATIONS, ["--station", name, *arguments, "--file", str(file.absolute())])
+        arguments += ["--file", str(file.absolute()), "--fetched", str(fetched.absolute())]
+        await self.supervisor.start(STATIONS, ["--station", name, *arguments])
+
+    async def ask_stations(self, request: RecordingsRequest) -> None:
+        """Raises StationsError, BusError."""
+        await self._bus.call(STATIONS, request, result=type(None), timeout_s=_CALL_TIMEOUT_S, appears_s=_APPEARS_S)
 
     async def no_stations(self) -> None:
         """Ends one that a server before this one, which met other stations, has left running."""

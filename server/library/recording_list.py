@@ -1,4 +1,5 @@
-"""The shelf of recordings: one file each, written by a vehicle's recorder into its own folder, or brought in.
+"""The shelf of recordings: one file each, written by a vehicle's recorder into its own folder, or brought in; those of
+other stations in folders of their names.
 
 A recording's id is made from its file name, so that the folders are all there is to keep: no list can contradict it.
 """
@@ -19,11 +20,12 @@ from server.library.terrain_of import FlownOver, terrain_of
 from server.library.whole_files import check_id, storage_errors, sync_directory
 from server.schemas import RecordingDoc
 from server.schemas.station_docs import FIRST_VEHICLE
+from telemetry.stations.station_names import checked_name
 
 if TYPE_CHECKING:
     from telemetry.recording.describe import RecordingInfo
 
-FOLDER = "recordings"
+FOLDER, FETCHED = "recordings", "fetched"
 KINDS: dict[str, Literal["hedgehop", "tlog", "dataflash", "ulog"]] = {
     ".mcap": "hedgehop",
     ".tlog": "tlog",
@@ -53,14 +55,22 @@ class RecordingShelf:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         return folder
 
+    @property
+    def root(self) -> Path:
+        return self._library.root
+
     def docs(self) -> list[RecordingDoc]:
         """Newest first. Those that are being written are left out: they are on show elsewhere."""
+        return [doc for _, doc in self.shelved()]
+
+    def shelved(self) -> list[tuple[Path, RecordingDoc]]:
+        """The same, each with its file."""
         written = set(self.being_written.values())
         files = [path for path in self._files() if path not in written]
-        docs = [self._doc(path) for path in files]
+        docs = [(path, self._doc(path)) for path in files]
         present = {str(path) for path in files}
         self._known = {key: info for key, info in self._known.items() if key[0] in present}
-        return sorted(docs, key=lambda doc: (doc.started_utc, doc.name), reverse=True)
+        return sorted(docs, key=lambda each: (each[1].started_utc, each[1].name), reverse=True)
 
     def path(self, recording_id: str) -> Path:
         """Raises NotFoundError."""
@@ -74,10 +84,13 @@ class RecordingShelf:
         """Raises NotFoundError."""
         return self._doc(self.path(recording_id))
 
-    def add(self, upload: Path, name: str) -> RecordingDoc:
-        """Takes in an uploaded file under its own name, or one near it; it has been read before."""
-        target = self._free_place(name)
+    def add(self, upload: Path, name: str, station: str = "") -> RecordingDoc:
+        """Takes in a file under its own name, or one near it; it has been read before. ``station``: from which it was
+        fetched."""
+        folder = self._library.root / FETCHED / checked_name(station) if station else self._folder
+        target = _free_place(folder, name)
         with storage_errors(target):
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             os.rename(upload, target)
             sync_directory(target.parent)
         return self._doc(target)
@@ -91,7 +104,8 @@ class RecordingShelf:
     def _files(self) -> list[Path]:
         with storage_errors(self._folder):
             others = (folder / FOLDER for folder in self._library.vehicle_dirs().values())
-            folders = [self._folder, *(folder for folder in others if folder.is_dir())]
+            fetched = (self._library.root / FETCHED).glob("[!.]*")
+            folders = [self._folder, *(folder for folder in (*others, *fetched) if folder.is_dir())]
             return [path for folder in folders for path in folder.iterdir() if _is_recording(path)]
 
     def _id(self, path: Path) -> str:
@@ -101,7 +115,11 @@ class RecordingShelf:
 
     def _flown_by(self, path: Path) -> str:
         """Systems of several vehicles may all have the same number. Those of the first lie with what was brought in."""
-        return "" if path.parent == self._folder else f"Vehicle {path.parent.parent.name}"
+        return "" if path.parent == self._folder or self._station(path) else f"Vehicle {path.parent.parent.name}"
+
+    def _station(self, path: Path) -> str:
+        """From which it was fetched."""
+        return path.parent.name if path.parent.parent == self._library.root / FETCHED else ""
 
     def _doc(self, path: Path) -> RecordingDoc:
         info = self._info(path)
@@ -118,6 +136,7 @@ class RecordingShelf:
             plan_name=info.plan_name,
             terrain_id=None if terrain is None else terrain.id,
             fault=info.fault or "",
+            station=self._station(path),
         )
 
     def _info(self, path: Path) -> RecordingInfo:
@@ -128,13 +147,6 @@ class RecordingShelf:
         if key not in self._known:
             self._known[key] = describe_recording(path)
         return self._known[key]
-
-    def _free_place(self, name: str) -> Path:
-        stem, suffix = _plain_stem(name), suffix_of_recording(name)
-        number = 1
-        while (target := self._folder / f"{stem}{f'-{number}' if number > 1 else ''}{suffix}").exists():
-            number += 1
-        return target
 
 
 def recording_id_of(name: str) -> str:
@@ -150,6 +162,20 @@ def suffix_of_recording(name: str) -> str:
             advice="Choose a recording (.mcap), a ground station's log (.tlog) or a vehicle's own (.bin, .ulg).",
         )
     return suffix
+
+
+def _free_place(folder: Path, name: str) -> Path:
+    plain = Path(shelf_name(name))
+    stem, suffix = plain.stem, plain.suffix
+    number = 1
+    while (target := folder / f"{stem}{f'-{number}' if number > 1 else ''}{suffix}").exists():
+        number += 1
+    return target
+
+
+def shelf_name(name: str) -> str:
+    """Under which it is taken in, unless there is one of that name. Raises BadRequestError."""
+    return f"{_plain_stem(name)}{suffix_of_recording(name)}"
 
 
 def _plain_stem(name: str) -> str:

@@ -133,6 +133,10 @@ from server.schemas.station_docs import (
     AuditEntryDoc,
     OtherStationDoc,
     OtherVehicleDoc,
+    RecordingFetchDoc,
+    RecordingsThereDoc,
+    RecordingThereDoc,
+    StationRecordingsDoc,
     VehicleAlarm,
     VehicleDoc,
 )
@@ -169,6 +173,7 @@ from server.schemas.stream import (
     SelectionMessage,
     ServerMessage,
     Snapshot,
+    StationRecordingsMessage,
     StationsMessage,
     TextMessage,
     TrackMessage,

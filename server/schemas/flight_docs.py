@@ -203,6 +203,8 @@ class RecordingDoc(Strict):
     """A surface model in the library that it was flown over."""
     fault: str = ""
     """Why it can only be opened in part, or not at all."""
+    station: str = ""
+    """The other one from which it was fetched; empty: it was recorded or brought in here."""
 
 
 class VehicleLogDoc(Strict):

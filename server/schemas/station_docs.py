@@ -131,6 +131,62 @@ class OtherVehicleDoc(Strict):
     """What is wrong with it, or with what is known of it."""
 
 
+class RecordingThereDoc(Strict):
+    """Of another station, as that one tells of it."""
+
+    sha256: str
+    name: str
+    bytes: int
+    started_utc: str | None
+    duration_s: float | None
+    vehicle: str = ""
+    plan_name: str = ""
+    recording_id: str | None = None
+    """Once it was fetched: here."""
+
+
+class StationRecordingsDoc(Strict):
+    name: str
+    state: Literal["live", "lost"]
+    listed: Literal["no", "asking", "listed", "silent", "off"]
+    """no: it was not asked yet; silent: it does not answer; off: it offers none."""
+    age_s: float | None
+    """Of the list; null: none has come."""
+    text: str = ""
+    """What is wrong with the list or missing in it, and what to do."""
+    recordings: list[RecordingThereDoc]
+    """Newest first; the last that were listed, while it is lost or asked anew."""
+
+
+class RecordingFetchDoc(Strict):
+    """A recording that is being fetched, or could not be."""
+
+    station: str
+    sha256: str
+    name: str
+    bytes: int
+    have_bytes: int
+    state: Literal["waiting", "fetching", "checking", "whole", "failed"]
+    """waiting: for its station, or for those before it; checking: its SHA-256 is computed; whole: it is opened."""
+    left_s: float | None
+    """At the pace of the last ten seconds."""
+    text: str = ""
+    """Why it waits or failed, and what to do."""
+
+
+class RecordingsThereDoc(Strict):
+    """Recordings of other stations, and what is fetched of them."""
+
+    now_mono_s: float
+    """The server's clock, from which the ages in it count."""
+    is_offered: bool
+    """This station's own are offered to the others."""
+    kb_s: int
+    """So much of them comes in a second at most."""
+    stations: list[StationRecordingsDoc]
+    fetches: list[RecordingFetchDoc]
+
+
 class OtherStationDoc(Strict):
     name: str
     state: Literal["live", "lost"]

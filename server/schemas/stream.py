@@ -14,7 +14,7 @@ from server.schemas.library_docs import JobDoc, LibraryState
 from server.schemas.obstacle_docs import ObstaclesState, SensorName
 from server.schemas.result_docs import ErrorDoc, PlanState
 from server.schemas.review_docs import ReviewDoc
-from server.schemas.station_docs import AlarmDoc, OtherStationDoc, VehicleDoc
+from server.schemas.station_docs import AlarmDoc, OtherStationDoc, RecordingsThereDoc, VehicleDoc
 from server.schemas.strict_model import Message
 from server.schemas.study_docs import RadarFileDoc, ScenarioRunDoc
 from server.schemas.traversability_docs import TraversabilityState
@@ -103,6 +103,13 @@ class StationsMessage(Message):
     stations: list[OtherStationDoc]
     refused: int
     """Messages that were malformed, foreign or repeated."""
+
+
+class StationRecordingsMessage(Message):
+    """Recordings of other stations and what is fetched of them, every two seconds and while something changes."""
+
+    type: Literal["station_recordings"] = "station_recordings"
+    there: RecordingsThereDoc
 
 
 class ClockMessage(Message):
@@ -324,6 +331,7 @@ ServerMessage = Annotated[
     | AlarmsMessage
     | FleetMessage
     | StationsMessage
+    | StationRecordingsMessage
     | PlanMessage
     | LibraryMessage
     | ViewMessage

@@ -80,7 +80,7 @@ class Desk:
         self.now_s, self.published = NOW_S, list[StationsMessage]()
         hub: Any = SimpleNamespace(publish=self.published.append)
         none: Any = None
-        meeting = Meeting(("tls/router:7447",), Path("Alpha.pem"))
+        meeting = Meeting(("tls/router:7447",), Path("Alpha.pem"), Path("fetched"))
         self.it = OtherStations(meeting, none, none, hub, lambda: [], now_mono_s=lambda: self.now_s)
         self.tell(*vehicles, **more)
 

@@ -32,7 +32,7 @@ class Unmet:
         nodes: Any = SimpleNamespace(stations=self._start)
         bus: Any = none
         self.now_s = 0.0
-        meeting = Meeting(("tls/router:7447",), file)
+        meeting = Meeting(("tls/router:7447",), file, file.with_name("fetched"))
         self.it = OtherStations(meeting, bus, nodes, hub, lambda: [], now_mono_s=lambda: self.now_s)
 
     async def _start(self, *with_those: Any) -> None:
@@ -82,7 +82,7 @@ def test_its_crew_can_fly_is_told_and_others_are_not_passed(
         file.unlink(missing_ok=True)
         write_station_files(file.parent, CertificateFiles(tmp_path / "data"), ["Alpha"], ["router"], now_utc())
         await asyncio.wait_for(begun, PATIENCE_S)
-        assert unmet.started == [("Alpha", ("tls/router:7447",), file)]
+        assert unmet.started == [("Alpha", ("tls/router:7447",), file, file.with_name("fetched"))]
         assert (unmet.texts, unmet.it.message().station) == ([], "Alpha")
         assert "cannot be used" not in unmet.it.row().text + unmet.it.message().text
 

@@ -1515,6 +1515,59 @@ export interface OtherVehicleDoc {
   text: string;
 }
 
+/** Of another station, as that one tells of it. */
+export interface RecordingThereDoc {
+  sha256: string;
+  name: string;
+  bytes: number;
+  started_utc: string | null;
+  duration_s: number | null;
+  vehicle: string;
+  plan_name: string;
+  /** Once it was fetched: here. */
+  recording_id: string | null;
+}
+
+export interface StationRecordingsDoc {
+  name: string;
+  state: "live" | "lost";
+  /** no: it was not asked yet; silent: it does not answer; off: it offers none. */
+  listed: "no" | "asking" | "listed" | "silent" | "off";
+  /** Of the list; null: none has come. */
+  age_s: number | null;
+  /** What is wrong with the list or missing in it, and what to do. */
+  text: string;
+  /** Newest first; the last that were listed, while it is lost or asked anew. */
+  recordings: RecordingThereDoc[];
+}
+
+/** A recording that is being fetched, or could not be. */
+export interface RecordingFetchDoc {
+  station: string;
+  sha256: string;
+  name: string;
+  bytes: number;
+  have_bytes: number;
+  /** waiting: for its station, or for those before it; checking: its SHA-256 is computed; whole: it is opened. */
+  state: "waiting" | "fetching" | "checking" | "whole" | "failed";
+  /** At the pace of the last ten seconds. */
+  left_s: number | null;
+  /** Why it waits or failed, and what to do. */
+  text: string;
+}
+
+/** Recordings of other stations, and what is fetched of them. */
+export interface RecordingsThereDoc {
+  /** The server's clock, from which the ages in it count. */
+  now_mono_s: number;
+  /** This station's own are offered to the others. */
+  is_offered: boolean;
+  /** So much of them comes in a second at most. */
+  kb_s: number;
+  stations: StationRecordingsDoc[];
+  fetches: RecordingFetchDoc[];
+}
+
 export interface OtherStationDoc {
   name: string;
   state: "live" | "lost";
@@ -1732,6 +1785,8 @@ export interface RecordingDoc {
   terrain_id: string | null;
   /** Why it can only be opened in part, or not at all. */
   fault: string;
+  /** The other one from which it was fetched; empty: it was recorded or brought in here. */
+  station: string;
 }
 
 /** A log that lies on the vehicle. */
@@ -2746,6 +2801,13 @@ export interface StationsMessage {
   refused: number;
 }
 
+/** Recordings of other stations and what is fetched of them, every two seconds and while something changes. */
+export interface StationRecordingsMessage {
+  v: 1;
+  type: "station_recordings";
+  there: RecordingsThereDoc;
+}
+
 /** The answer to a page's ping: what the page said its clock is, and the clock of all ``t_mono_s`` when it came. */
 export interface ClockMessage {
   v: 1;
@@ -3028,6 +3090,7 @@ export type ServerMessage =
   | AlarmsMessage
   | FleetMessage
   | StationsMessage
+  | StationRecordingsMessage
   | PlanMessage
   | LibraryMessage
   | ViewMessage

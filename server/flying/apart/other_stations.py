@@ -61,6 +61,8 @@ class Meeting:
 
     routers: tuple[str, ...]
     file: Path
+    fetched: Path
+    """Where recordings of others lie until they are whole."""
 
 
 class OtherStations:
@@ -102,7 +104,7 @@ class OtherStations:
             log.info("The station's file can be read: this station is %s.", self._name)
         self._fault = ""
         alarms.end("stations")
-        await self._nodes.stations(self._name, meeting.routers, meeting.file)
+        await self._nodes.stations(self._name, meeting.routers, meeting.file, meeting.fetched)
 
     def _on_fault(self, error: ErrorDoc, alarms: Alarms) -> None:
         status = self.status

@@ -7,6 +7,7 @@ import { forgetObstacles, forgetSensing } from "./obstacles";
 import { forgetMoving } from "./moving";
 import { replay, review } from "./review";
 import { forgetStations } from "./stations";
+import { forgetThere } from "./there";
 import { forgetTraffic } from "./traffic";
 import { forgetTraversability } from "./traversability";
 
@@ -38,6 +39,7 @@ const FORGET: Partial<Record<string, () => void>> = {
   "traffic replay": () => forgetTraffic("replay"),
   traversability: forgetTraversability,
   stations: forgetStations,
+  station_recordings: forgetThere,
   "obstacles live": () => forgetObstacles("live"),
   "obstacles replay": () => forgetObstacles("replay"),
 };

@@ -16,6 +16,7 @@ import { radarFiles, runs } from "./studies";
 import { forgetAsked, takeAnswer, takeSelection, takeView } from "./shared";
 import * as state from "./state";
 import { takeStations } from "./stations";
+import { takeThere } from "./there";
 import { traversability } from "./traversability";
 
 /** Takes one message of the stream into the page's state. */
@@ -64,6 +65,9 @@ export function receive(message: ServerMessage): void {
       return;
     case "stations":
       takeStations(message, performance.now());
+      return;
+    case "station_recordings":
+      takeThere(message.there, performance.now());
       return;
     case "alarms":
       alarms.value = message.alarms;

@@ -1,0 +1,238 @@
+"""Recordings of other stations at the server: what is offered and asked for, and what becomes of one that has come."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from server.errors import BusyError, InUseError, NotReadyError
+from server.flying.apart import recordings_there
+from server.flying.apart.recordings_there import FRESH_S, RecordingsThere
+from server.library import Library
+from server.library.recording_list import FETCHED, RecordingShelf
+from server.schemas import RecordingDoc
+from telemetry.errors import RecordingError
+from telemetry.topics.station_recordings import (
+    EndFetch,
+    FetchRecording,
+    FetchState,
+    FetchStatus,
+    ListRecordings,
+    ListState,
+    RecordingsStatus,
+    RecordingThere,
+    StationRecordings,
+)
+from telemetry.topics.station_vehicles import OtherStation, StationsStatus
+from tests.server.fakes import Told
+from tests.telemetry.recordings import write_flight
+
+NOW_S = 1000.0
+IT = RecordingThere("ab" * 32, "flight.mcap", 1000, 1.7e9, 1.7e9 + 60, "Vehicle 1", "Ridge")
+
+
+def doc_of(name: str, station: str = "") -> RecordingDoc:
+    return RecordingDoc(
+        id=f"id-{name}-{station}",
+        name=name,
+        kind="hedgehop",
+        started_utc="2026-01-01T00:00:00Z",
+        duration_s=60.0,
+        bytes=1000,
+        vehicle="Vehicle 1",
+        plan_name="Ridge",
+        station=station,
+    )
+
+
+class Desk:
+    """Of recordings: takes in what ``answers`` lets it, else raises."""
+
+    def __init__(self, root: Path) -> None:
+        self.root, self.shelf, self.answers = root, list[tuple[Path, RecordingDoc]](), list[Any]()
+        self.taken = list[tuple[str, str, str]]()
+
+    async def shelved(self) -> list[tuple[Path, RecordingDoc]]:
+        return self.shelf
+
+    async def add_fetched(self, path: str, name: str, station: str) -> RecordingDoc:
+        if self.answers and (error := self.answers.pop(0)) is not None:
+            raise error
+        self.taken.append((path, name, station))
+        return doc_of(name, station)
+
+
+class There:
+    """The desk, what its node was asked, and what pages were told."""
+
+    def __init__(self, root: Path, *, is_on: bool = True, state: Any = "live") -> None:
+        self.desk, self.asked, self.told = Desk(root), list[Any](), Told()
+        nodes: Any = SimpleNamespace(ask_stations=self._ask)
+        none: Any = None
+        desk: Any = self.desk
+        stations = StationsStatus(NOW_S, "Alpha", "connected", stations=(OtherStation("Bravo", state, NOW_S, 0.0, 1),))
+        self.it = RecordingsThere(
+            none, nodes, self.told, desk, lambda: stations, is_on=is_on, kb_s=8, now_mono_s=lambda: NOW_S
+        )
+
+    async def _ask(self, request: object) -> None:
+        self.asked.append(request)
+
+    def listed(self, state: ListState = "listed", *, age_s: float = 0.0) -> None:
+        self.it.on_status(RecordingsStatus(NOW_S, (StationRecordings("Bravo", state, NOW_S - age_s, "", (IT,)),)))
+
+    def fetched(self, state: FetchState, have: int = 1000) -> None:
+        fetch = FetchStatus("Bravo", IT, state, have, 100.0 if state == "fetching" else 0.0, "", "/some/where.mcap")
+        self.it.on_status(RecordingsStatus(NOW_S, (), (fetch,)))
+
+
+def play(whole: Callable[[], Awaitable[None]]) -> None:
+    asyncio.run(asyncio.wait_for(whole(), 30.0))  # type: ignore[arg-type]
+
+
+async def taking(there: There, done: Callable[[], bool]) -> None:
+    loop = asyncio.ensure_future(there.it._take_in())
+    while not done():
+        await asyncio.sleep(0)
+    loop.cancel()
+    with suppress(asyncio.CancelledError):
+        await loop
+
+
+def test_a_look_asks_stations_that_are_heard_unless_their_list_is_fresh(tmp_path: Path) -> None:
+    async def whole() -> None:
+        there = There(tmp_path)
+        await there.it.look()
+        there.listed("asking")
+        await there.it.look()
+        there.listed(age_s=FRESH_S - 1)
+        await there.it.look()
+        assert there.asked == [ListRecordings("Bravo")]
+        there.listed(age_s=FRESH_S + 1)
+        await there.it.look()
+        assert there.asked == [ListRecordings("Bravo")] * 2
+        lost = There(tmp_path, state="lost")
+        await lost.it.look()
+        assert lost.asked == []
+
+    play(whole)
+
+
+def test_own_ones_are_offered_and_neither_fetched_nor_pulled_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recordings_there, "pulled_recordings", lambda root: frozenset({"pulled.mcap"}))
+
+    async def whole() -> None:
+        for is_on, names in ((True, ["own.mcap"]), (False, [])):
+            there = There(tmp_path, is_on=is_on)
+            there.desk.shelf = [
+                (Path("/r/own.mcap"), doc_of("own.mcap")),
+                (Path("/r/pulled.mcap"), doc_of("pulled.mcap")),
+                (Path("/f/Bravo/flight.mcap"), doc_of("flight.mcap", "Bravo")),
+            ]
+            await there.it.list_own()
+            assert [each.name for each in there.it._own] == names
+            assert there.it.doc().is_offered is is_on
+
+    play(whole)
+
+
+def test_a_whole_one_is_taken_in_and_then_put_away_at_the_node(tmp_path: Path) -> None:
+    async def whole() -> None:
+        there = There(tmp_path)
+        there.fetched("whole")
+        await taking(there, lambda: bool(there.asked))
+        assert there.desk.taken == [("/some/where.mcap", "flight.mcap", "Bravo")]
+        assert there.asked == [EndFetch(IT.sha256)]
+        # It is listed there as one that is here, and is not fetched twice.
+        there.listed()
+        assert there.it.doc().stations[0].recordings[0].recording_id == "id-flight.mcap-Bravo"
+        with pytest.raises(InUseError, match="was fetched already"):
+            await there.it.fetch("Bravo", IT.sha256)
+
+    play(whole)
+
+
+def test_what_came_and_is_no_recording_is_said_until_it_is_put_away(tmp_path: Path) -> None:
+    async def whole() -> None:
+        there = There(tmp_path)
+        there.desk.answers = [RecordingError("The file is a program.", advice="Choose another one.")]
+        there.fetched("whole")
+        await taking(there, lambda: bool(there.asked))
+        assert there.asked == [EndFetch(IT.sha256)]  # nothing of it is kept
+        there.it.on_status(RecordingsStatus(NOW_S))
+        (failed,) = there.it.doc().fetches
+        assert (failed.state, "is no recording: The file is a program." in failed.text) == ("failed", True)
+        await there.it.end(IT.sha256)
+        assert there.it.doc().fetches == []
+
+    play(whole)
+
+
+def test_one_that_cannot_be_opened_now_is_kept_and_tried_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recordings_there, "AGAIN_S", 0.0)
+
+    async def whole() -> None:
+        there = There(tmp_path)
+        there.desk.answers = [BusyError("Too many jobs wait."), RuntimeError("a bug"), None]
+        there.fetched("whole")
+        await taking(there, lambda: bool(there.asked))
+        assert there.desk.taken == [("/some/where.mcap", "flight.mcap", "Bravo")]
+        said = [fetch.text for message in there.told for fetch in message.there.fetches]
+        assert any("is tried to be opened again: Too many jobs wait." in text for text in said)
+        assert not any("a bug" in text for text in said)
+
+    play(whole)
+
+
+def test_one_that_was_taken_in_before_the_server_died_is_not_fetched_anew(tmp_path: Path) -> None:
+    async def whole() -> None:
+        there = There(tmp_path)
+        there.desk.shelf = [(Path("/f/Bravo/flight.mcap"), doc_of("flight.mcap", "Bravo"))]
+        await there.it.list_own()
+        there.fetched("waiting", have=0)
+        await taking(there, lambda: bool(there.asked))
+        assert (there.asked, there.desk.taken) == ([EndFetch(IT.sha256)], [])
+
+    play(whole)
+
+
+def test_pages_are_told_how_far_it_is_and_a_lost_station_gives_none(tmp_path: Path) -> None:
+    async def whole() -> None:
+        there = There(tmp_path, state="lost")
+        there.fetched("fetching", have=400)
+        (fetch,) = there.told[-1].there.fetches
+        assert (fetch.have_bytes, fetch.bytes, fetch.left_s) == (400, 1000, 6.0)
+        with pytest.raises(NotReadyError, match="Bravo is not heard"):
+            await there.it.fetch("Bravo", IT.sha256)
+        live = There(tmp_path)
+        await live.it.fetch("Bravo", IT.sha256)
+        assert live.asked == [FetchRecording("Bravo", IT.sha256)]
+
+    play(whole)
+
+
+def test_the_shelf_lists_a_fetched_one_with_where_it_came_from_and_deletes_it(tmp_path: Path) -> None:
+    library = Library(tmp_path / "data")
+    shelf = RecordingShelf(library)
+    write_flight(tmp_path / "a.mcap", seconds=2.0)
+    write_flight(tmp_path / "b.mcap", seconds=2.0)
+    own = shelf.add(tmp_path / "a.mcap", "flight.mcap")
+    fetched = shelf.add(tmp_path / "b.mcap", "flight.mcap", "Bravo")
+    assert {(doc.name, doc.station) for doc in shelf.docs()} == {("flight.mcap", ""), ("flight.mcap", "Bravo")}
+    assert own.id != fetched.id
+    assert shelf.path(fetched.id) == library.root / FETCHED / "Bravo" / "flight.mcap"
+    # What is still coming is not listed.
+    parts = library.root / FETCHED / ".parts"
+    parts.mkdir()
+    write_flight(parts / "c.mcap", seconds=1.0)
+    assert len(shelf.docs()) == 2
+    shelf.delete(fetched.id)
+    assert [doc.id for doc in shelf.docs()] == [own.id]

@@ -1,0 +1,85 @@
+import { computed, signal } from "@preact/signals";
+import { bytes, duration, number } from "../format";
+import type { RecordingFetchDoc, RecordingsThereDoc, StationRecordingsDoc } from "../messages";
+import { asErrorDoc, isCancelled, requestJson } from "../net/api";
+import { now_ms } from "./clock";
+import { order } from "./outcomes";
+import { setError } from "./state";
+
+/** Recordings of other stations, and what is fetched of them; null where none are met. */
+export const there = signal<RecordingsThereDoc | null>(null);
+/** Where errors of them appear. */
+export const THERE = "stations-recordings";
+
+let received_ms = 0;
+
+export function takeThere(doc: RecordingsThereDoc, at_ms: number): void {
+  received_ms = at_ms;
+  there.value = doc;
+}
+
+export const forgetThere = () => {
+  there.value = null;
+};
+
+const pathOf = (station: string, sha256: string) =>
+  `/api/stations/${encodeURIComponent(station)}/recordings/${sha256}`;
+
+/** Has the stations that are heard asked for their lists; those that are fresh are left. */
+export async function askThere(): Promise<void> {
+  try {
+    takeThere(
+      await requestJson<RecordingsThereDoc>("GET", "/api/stations/recordings?ask=true"),
+      performance.now(),
+    );
+    setError(THERE, null);
+  } catch (error) {
+    if (!isCancelled(error)) setError(THERE, asErrorDoc(error));
+  }
+}
+
+export const fetchThere = (station: string, sha256: string) =>
+  order({ place: THERE, path: pathOf(station, sha256) });
+
+export const endFetch = ({ station, sha256 }: RecordingFetchDoc) =>
+  order({ place: THERE, path: pathOf(station, sha256), method: "DELETE" });
+
+export const fetchOf = (sha256: string): RecordingFetchDoc | undefined =>
+  there.value?.fetches.find((fetch) => fetch.sha256 === sha256);
+
+/** Fetches that stand in no list: their station is not listed anew since, or lists them no more. */
+export const unlisted = computed(() => {
+  const listed = new Set(
+    there.value?.stations.flatMap((each) => each.recordings.map(({ sha256 }) => sha256)),
+  );
+  return there.value?.fetches.filter(({ sha256 }) => !listed.has(sha256)) ?? [];
+});
+
+/** How a station's list stands: lost first, then how old what is shown is. */
+export function listWords({ state, listed, age_s }: StationRecordingsDoc): string {
+  const by_now_s = age_s === null ? null : age_s + Math.max(0, now_ms.value - received_ms) / 1000;
+  const age = by_now_s === null ? "" : `as of ${duration(by_now_s)} ago`;
+  const how = { no: "not asked yet", asking: "being asked…", listed: "", silent: "no answer", off: "" }[
+    listed
+  ];
+  return [state === "lost" ? "lost" : "", state === "lost" && listed === "asking" ? "" : how, age]
+    .filter(Boolean)
+    .join(" · ");
+}
+
+/** What a fetch has come to; why it waits or failed stands beside it. */
+export function fetchWords({ state, have_bytes, bytes: all, left_s }: RecordingFetchDoc): string {
+  const part = `${number(have_bytes / 1e6, 1)} of ${bytes(all)}`;
+  switch (state) {
+    case "waiting":
+      return `waits · ${part}`;
+    case "fetching":
+      return left_s === null ? part : `${part} · ${duration(left_s)} left`;
+    case "checking":
+      return "checking its SHA-256…";
+    case "whole":
+      return "opening…";
+    case "failed":
+      return have_bytes ? `failed at ${part}` : "failed";
+  }
+}
