@@ -35,6 +35,7 @@ import { Section } from "../ui/Section";
 import { Check } from "../ui/fields";
 import { Bags } from "./Bags";
 import { StudyLeft } from "./Studies";
+import { There } from "./There";
 
 /** Recordings that were dropped or chosen: imported, and the last of them opened. */
 export function takeRecordings(files: readonly File[]): void {
@@ -113,6 +114,7 @@ function Row({ recording }: { recording: RecordingDoc }) {
     recording.duration_s === null ? "length unknown" : duration(recording.duration_s),
     bytes(recording.bytes),
     recording.kind === "tlog" ? "tlog" : recording.vehicle,
+    recording.station && `from ${recording.station}`,
   ].filter(Boolean);
   return (
     <li class={`recording ${isOpen ? "current" : ""}`} data-testid="recording-row" data-open={isOpen}>
@@ -256,6 +258,7 @@ function FlightsLeft() {
     <>
       <div class="panel-scroll">
         <Recordings />
+        <There />
         <Bags />
         <Judge />
         <Maps />
