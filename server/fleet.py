@@ -79,7 +79,7 @@ class Fleet:
             self._there = RecordingsThere(
                 self.first.bus,
                 self.first.nodes,
-                present,
+                shared.hub,
                 self.recordings,
                 lambda: stations.status,
                 is_on=settings.stations_recordings,
