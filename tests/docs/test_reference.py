@@ -19,6 +19,7 @@ from telemetry.topics.messages import MESSAGE_TYPES, REPLAY_PREFIX
 from telemetry.topics.obstacles import PerceptionSettings
 from telemetry.topics.recording_requests import RecorderRequest, ReplayRequest
 from telemetry.topics.requests import LinkRequest, PerceptionRequest
+from telemetry.topics.station_recordings import RecordingsRequest
 from tests.conftest import ROOT
 from tests.docs.pages import code_names, rows, text_of
 
@@ -45,6 +46,7 @@ def test_requests_of_the_nodes_are_those_of_the_code() -> None:
         ("radar", "vision", "ranges"): _names(PerceptionRequest),
         ("recorder",): _names(RecorderRequest),
         ("replay",): _names(ReplayRequest),
+        ("stations",): _names(RecordingsRequest),
     }
 
 
