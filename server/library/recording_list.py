@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
+import logging
 import os
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Literal
 
-from server.errors import BadRequestError, NotFoundError
+from server.errors import BadRequestError, NotFoundError, reported
 from server.library.library import Library
 from server.library.shelf import iso_utc
 from server.library.terrain_of import FlownOver, terrain_of
@@ -25,6 +26,8 @@ from telemetry.stations.station_names import checked_name
 if TYPE_CHECKING:
     from telemetry.recording.describe import RecordingInfo
 
+log = logging.getLogger("hedgehop.library")
+
 FOLDER, FETCHED = "recordings", "fetched"
 KINDS: dict[str, Literal["hedgehop", "tlog", "dataflash", "ulog"]] = {
     ".mcap": "hedgehop",
@@ -32,6 +35,10 @@ KINDS: dict[str, Literal["hedgehop", "tlog", "dataflash", "ulog"]] = {
     ".bin": "dataflash",
     ".ulg": "ulog",
 }
+
+
+_LATEST_CHANGE_UTC_S = 253_402_300_799.0
+"""The last second of the year 9999."""
 
 
 class RecordingShelf:
@@ -123,11 +130,15 @@ class RecordingShelf:
 
     def _doc(self, path: Path) -> RecordingDoc:
         info = self._info(path)
+        name = plain_name(path)
+        fault = info.fault or ""
+        if name != path.name:
+            fault = f"Its name is not UTF-8: rename the file, so that it can be opened. {fault}".strip()
         flown = FlownOver(info.terrain_id, info.terrain_sha256)
         terrain = terrain_of(flown, self._library.terrains())
         return RecordingDoc(
             id=self._id(path),
-            name=path.name,
+            name=name,
             kind=KINDS[path.suffix.lower()],
             started_utc=iso_utc(info.start_utc_s if info.start_utc_s is not None else _changed_utc_s(path)),
             duration_s=info.duration_s,
@@ -135,22 +146,32 @@ class RecordingShelf:
             vehicle=", ".join(filter(None, (self._flown_by(path), info.vehicle))),
             plan_name=info.plan_name,
             terrain_id=None if terrain is None else terrain.id,
-            fault=info.fault or "",
+            fault=fault,
             station=self._station(path),
         )
 
     def _info(self, path: Path) -> RecordingInfo:
         # Brings in the wire protocols: only when somebody looks at recordings.
-        from telemetry.recording.describe import describe_recording
+        from telemetry.recording.describe import RecordingInfo, describe_recording
 
         key = _key(path)
         if key not in self._known:
-            self._known[key] = describe_recording(path)
+            try:
+                self._known[key] = describe_recording(path)
+            except Exception as error:
+                # One file is one line of the list, whatever is in it; said once, until the file changes.
+                doc = reported(error, log, f"Looking at the recording {plain_name(path)}")
+                self._known[key] = RecordingInfo(path.name, max(0, key[1]), fault=doc.what)
         return self._known[key]
 
 
 def recording_id_of(name: str) -> str:
-    return hashlib.sha256(name.encode()).hexdigest()[:16]
+    return hashlib.sha256(os.fsencode(name)).hexdigest()[:16]
+
+
+def plain_name(path: Path) -> str:
+    """What is no UTF-8 of it is replaced: such a name can be told to no page."""
+    return os.fsencode(path.name).decode("utf-8", "replace")
 
 
 def suffix_of_recording(name: str) -> str:
@@ -186,17 +207,23 @@ def _plain_stem(name: str) -> str:
 
 
 def _is_recording(path: Path) -> bool:
-    return path.suffix.lower() in KINDS and path.is_file() and not path.is_symlink() and not path.name.startswith(".")
+    if path.suffix.lower() not in KINDS or path.name.startswith("."):
+        return False
+    try:
+        return path.is_file() and not path.is_symlink()
+    except OSError:  # of a failing disk: it is listed, with what is wrong
+        return True
 
 
 def _key(path: Path) -> tuple[str, int, int]:
     """Changes when the file does."""
     try:
         status = path.stat()
-    except FileNotFoundError:
+    except OSError:
         return str(path), -1, 0
     return str(path), status.st_size, status.st_mtime_ns
 
 
 def _changed_utc_s(path: Path) -> float:
-    return max(0, _key(path)[2]) / 1e9
+    """Whatever date the disk tells: one that can be written down."""
+    return min(max(0, _key(path)[2]) / 1e9, _LATEST_CHANGE_UTC_S)

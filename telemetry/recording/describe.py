@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -25,6 +26,8 @@ _AUTOPILOTS = {"ardupilot": "ArduPilot", "px4": "PX4"}
 _HEAD_BYTES = 256 * 1024
 _TAIL_BYTES = 64 * 1024
 _HEARTBEAT = 0
+LATEST_UTC_S = 253_402_300_799.0
+"""The last second of the year 9999: later ones are no dates."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +49,7 @@ class RecordingInfo:
 
 
 def describe_recording(path: Path) -> RecordingInfo:
-    """Never raises: what is wrong with a file stands in ``fault``."""
+    """Never raises for what a file holds: what is wrong with it stands in ``fault``."""
     try:
         size = path.stat().st_size
     except OSError as error:
@@ -54,14 +57,25 @@ def describe_recording(path: Path) -> RecordingInfo:
     try:
         with opened(path) as data:
             if is_mcap(data):
-                return _of_mcap(path.name, data)
+                return _dated(_of_mcap(path.name, data))
             if (kind := kind_of_own_log(data)) is not None:
-                return _of_own_log(path.name, data, kind)
+                return _dated(_of_own_log(path.name, data, kind))
             if looks_like_tlog(data):
-                return _of_tlog(path.name, data)
+                return _dated(_of_tlog(path.name, data))
             raise foreign(path, data)
     except RecordingError as error:
         return RecordingInfo(path.name, size, fault=error.what)
+
+
+def _dated(info: RecordingInfo) -> RecordingInfo:
+    """Without a time that is none."""
+    start_s, lasts_s = info.start_utc_s, info.duration_s
+    if start_s is not None and not 0.0 <= start_s <= LATEST_UTC_S:
+        fault = " ".join(filter(None, ("The time in it is no date.", info.fault)))
+        info = replace(info, start_utc_s=None, fault=fault)
+    if lasts_s is not None and not (0.0 <= lasts_s <= LATEST_UTC_S and math.isfinite(lasts_s)):
+        info = replace(info, duration_s=None)
+    return info
 
 
 def _of_mcap(name: str, data: Data) -> RecordingInfo:

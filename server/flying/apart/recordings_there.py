@@ -14,11 +14,11 @@ from datetime import datetime
 from typing import Any
 
 from planning.errors import DescribedError
-from server.errors import InUseError, NotReadyError, error_doc
+from server.errors import InUseError, NotReadyError, error_doc, reported
 from server.flying.recordings import RecordingDesk
 from server.heard.node_states import Nodes
 from server.heard.relay import Relay
-from server.library.recording_list import shelf_name
+from server.library.recording_list import plain_name, shelf_name
 from server.library.sharing.versions import pulled_recordings
 from server.library.shelf import iso_utc
 from server.schemas import (
@@ -161,8 +161,9 @@ class RecordingsThere:
         while True:
             try:
                 await self.list_own()
-            except DescribedError as error:
-                log.warning("Listing recordings for other stations: %s", error.what)
+            except Exception as error:
+                doing = "Listing recordings for other stations"
+                log.warning("%s: %s", doing, reported(error, log, doing).what)
             await asyncio.sleep(LIST_EVERY_S)
 
     async def list_own(self) -> None:
@@ -173,7 +174,7 @@ class RecordingsThere:
         self._own = tuple(
             _offered(str(path), doc)
             for path, doc in shelved
-            if self._is_on and not doc.station and path.name not in pulled
+            if self._is_on and not doc.station and path.name not in pulled and plain_name(path) == path.name
         )
 
     # Those that have come
