@@ -235,7 +235,7 @@ class Fleet:
     def present(self) -> list[ServerMessage]:
         """What a page is told right after its snapshot, whichever vehicle it shows."""
         others = [] if self._stations is None else [self._stations.message()]
-        there = [] if self._there is None else [self._there.message()]
+        there = [] if self._there is None else self._there.messages()
         return [*self._present.messages(), *([self._message] if self._has_others else []), *others, *there]
 
     @property

@@ -173,6 +173,7 @@ from server.schemas.stream import (
     SelectionMessage,
     ServerMessage,
     Snapshot,
+    StationFetchesMessage,
     StationRecordingsMessage,
     StationsMessage,
     TextMessage,

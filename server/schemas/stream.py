@@ -14,7 +14,7 @@ from server.schemas.library_docs import JobDoc, LibraryState
 from server.schemas.obstacle_docs import ObstaclesState, SensorName
 from server.schemas.result_docs import ErrorDoc, PlanState
 from server.schemas.review_docs import ReviewDoc
-from server.schemas.station_docs import AlarmDoc, OtherStationDoc, RecordingsThereDoc, VehicleDoc
+from server.schemas.station_docs import AlarmDoc, OtherStationDoc, RecordingFetchDoc, StationRecordingsDoc, VehicleDoc
 from server.schemas.strict_model import Message
 from server.schemas.study_docs import RadarFileDoc, ScenarioRunDoc
 from server.schemas.traversability_docs import TraversabilityState
@@ -106,10 +106,17 @@ class StationsMessage(Message):
 
 
 class StationRecordingsMessage(Message):
-    """Recordings of other stations and what is fetched of them, every two seconds and while something changes."""
+    """Recordings of other stations, when a list of them has changed: they are long."""
 
     type: Literal["station_recordings"] = "station_recordings"
-    there: RecordingsThereDoc
+    stations: list[StationRecordingsDoc]
+
+
+class StationFetchesMessage(Message):
+    """What is fetched of them: what is new at once, how far it is every two seconds."""
+
+    type: Literal["station_fetches"] = "station_fetches"
+    fetches: list[RecordingFetchDoc]
 
 
 class ClockMessage(Message):
@@ -332,6 +339,7 @@ ServerMessage = Annotated[
     | FleetMessage
     | StationsMessage
     | StationRecordingsMessage
+    | StationFetchesMessage
     | PlanMessage
     | LibraryMessage
     | ViewMessage

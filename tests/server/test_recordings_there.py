@@ -185,7 +185,7 @@ def test_one_that_cannot_be_opened_now_is_kept_and_tried_again(tmp_path: Path, m
         there.fetched("whole")
         await taking(there, lambda: bool(there.asked))
         assert there.desk.taken == [("/some/where.mcap", "flight.mcap", "Bravo")]
-        said = [fetch.text for message in there.told for fetch in message.there.fetches]
+        said = [fetch.text for message in there.told for fetch in getattr(message, "fetches", [])]
         assert any("is tried to be opened again: Too many jobs wait." in text for text in said)
         assert not any("a bug" in text for text in said)
 
@@ -208,13 +208,33 @@ def test_pages_are_told_how_far_it_is_and_a_lost_station_gives_none(tmp_path: Pa
     async def whole() -> None:
         there = There(tmp_path, state="lost")
         there.fetched("fetching", have=400)
-        (fetch,) = there.told[-1].there.fetches
+        (fetch,) = there.told[-1].fetches
         assert (fetch.have_bytes, fetch.bytes, fetch.left_s) == (400, 1000, 6.0)
         with pytest.raises(NotReadyError, match="Bravo is not heard"):
             await there.it.fetch("Bravo", IT.sha256)
         live = There(tmp_path)
         await live.it.fetch("Bravo", IT.sha256)
         assert live.asked == [FetchRecording("Bravo", IT.sha256)]
+
+    play(whole)
+
+
+def test_lists_are_told_when_one_has_changed_and_not_with_every_piece(tmp_path: Path) -> None:
+    async def whole() -> None:
+        there, now_s = There(tmp_path), NOW_S
+        there.it._now_mono_s = lambda: now_s
+        lists = (StationRecordings("Bravo", "listed", NOW_S, "", (IT,)),)
+        for have in range(100):
+            now_s = NOW_S + 0.5 * have
+            fetch = FetchStatus("Bravo", IT, "fetching", have, 100.0 + have)
+            there.it.on_status(RecordingsStatus(now_s, lists, (fetch,)))
+        types = [message.type for message in there.told]
+        assert (types.count("station_recordings"), types.count("station_fetches")) == (1, 25)
+        assert [message.type for message in there.it.messages()] == ["station_recordings", "station_fetches"]
+        # One of the list is here: pages are told which.
+        there.it._here[recordings_there._key("Bravo", IT)] = "id"
+        there.it.on_status(RecordingsStatus(now_s, lists, (fetch,)))
+        assert there.told[-1].stations[0].recordings[0].recording_id == "id"
 
     play(whole)
 

@@ -2801,11 +2801,18 @@ export interface StationsMessage {
   refused: number;
 }
 
-/** Recordings of other stations and what is fetched of them, every two seconds and while something changes. */
+/** Recordings of other stations, when a list of them has changed: they are long. */
 export interface StationRecordingsMessage {
   v: 1;
   type: "station_recordings";
-  there: RecordingsThereDoc;
+  stations: StationRecordingsDoc[];
+}
+
+/** What is fetched of them: what is new at once, how far it is every two seconds. */
+export interface StationFetchesMessage {
+  v: 1;
+  type: "station_fetches";
+  fetches: RecordingFetchDoc[];
 }
 
 /** The answer to a page's ping: what the page said its clock is, and the clock of all ``t_mono_s`` when it came. */
@@ -3091,6 +3098,7 @@ export type ServerMessage =
   | FleetMessage
   | StationsMessage
   | StationRecordingsMessage
+  | StationFetchesMessage
   | PlanMessage
   | LibraryMessage
   | ViewMessage

@@ -91,11 +91,14 @@ describe("recordings of other stations", () => {
   });
 
   test("what the stream tells stands beside its recording, or alone where no list has it", () => {
-    receive({ v: 1, type: "station_recordings", there: doc({ fetches: [fetching] }) });
+    receive({ v: 1, type: "station_recordings", stations: [bravo] });
+    receive({ v: 1, type: "station_fetches", fetches: [fetching] });
     expect(fetchOf(SHA)).toEqual(fetching);
     expect(unlisted.value).toEqual([]);
-    receive({ v: 1, type: "station_recordings", there: doc({ stations: [], fetches: [fetching] }) });
+    receive({ v: 1, type: "station_recordings", stations: [] });
     expect(unlisted.value).toEqual([fetching]);
+    receive({ v: 1, type: "station_fetches", fetches: [] });
+    expect(unlisted.value).toEqual([]);
   });
 
   test("looking asks, pressing fetches, and cancelling deletes", async () => {
@@ -103,7 +106,7 @@ describe("recordings of other stations", () => {
       init?.method === "GET" ? Response.json(doc()) : new Response(null, { status: 204 }),
     );
     await askThere();
-    expect(there.value?.stations).toEqual([bravo]);
+    expect(there.value).toEqual([bravo]);
     await fetchThere("Bravo", SHA);
     await endFetch(fetching);
     expect(asked.mock.calls.map(([path, init]) => [init?.method, path])).toEqual([

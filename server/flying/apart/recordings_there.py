@@ -27,6 +27,8 @@ from server.schemas import (
     RecordingFetchDoc,
     RecordingsThereDoc,
     RecordingThereDoc,
+    ServerMessage,
+    StationFetchesMessage,
     StationRecordingsDoc,
     StationRecordingsMessage,
 )
@@ -78,7 +80,8 @@ class RecordingsThere:
         self._wrong: dict[str, tuple[RecordingThere, str, str]] = {}
         """By SHA-256: what came and is no recording, from where, and why."""
         self._taking: dict[str, str] = {}
-        self._told: tuple[object, object] = None, None
+        self._told_lists: object = None
+        self._told_fetches: tuple[object, object] = None, None
         self._told_s = 0.0
         self._came = asyncio.Event()
 
@@ -88,36 +91,36 @@ class RecordingsThere:
         return [*relay.loops(), self._offer(), self._list(), self._take_in()]
 
     def on_status(self, status: RecordingsStatus) -> None:
-        """Lists are long: pages are told of what is new at once, and how far a fetch is every two seconds."""
+        """Lists are long: pages are told of them when one has changed, and how far a fetch is every two seconds."""
         self._status = status
-        now_s, before = self._now_mono_s(), self._told
-        states = [(fetch.it.sha256, fetch.state, fetch.text) for fetch in status.fetches]
         heard = [(name, station.state) for name, station in self._heard().items()]
-        new = status.stations, states, heard
+        lists = status.stations, heard, self._here.copy()
+        if lists != self._told_lists:
+            self._told_lists = lists
+            self._pages.publish(self._lists_message())
+        now_s, before = self._now_mono_s(), self._told_fetches
+        states = [(fetch.it.sha256, fetch.state, fetch.text) for fetch in status.fetches]
         have = [fetch.have_bytes for fetch in status.fetches]
-        if new != before[0] or (have != before[1] and now_s - self._told_s >= TELL_FETCH_S):
-            self._told, self._told_s = (new, have), now_s
-            self._pages.publish(self.message())
+        if states != before[0] or (have != before[1] and now_s - self._told_s >= TELL_FETCH_S):
+            self._told_fetches, self._told_s = (states, have), now_s
+            self._tell_fetches()
         if any(self._is_done(fetch) for fetch in status.fetches):
             self._came.set()
 
     # Asked by pages and programs
 
     def doc(self) -> RecordingsThereDoc:
-        now_s, heard = self._now_mono_s(), self._heard()
-        lists = {each.station: each for each in self._status.stations}
         return RecordingsThereDoc(
-            now_mono_s=now_s,
+            now_mono_s=self._now_mono_s(),
             is_offered=self._is_on,
             kb_s=self._bytes_per_s // 1000,
-            stations=[
-                self._station_doc(name, heard.get(name), lists.get(name), now_s) for name in sorted({*heard, *lists})
-            ],
-            fetches=[*map(self._fetch_doc, self._status.fetches), *self._wrong_docs()],
+            stations=self._station_docs(),
+            fetches=self._fetch_docs(),
         )
 
-    def message(self) -> StationRecordingsMessage:
-        return StationRecordingsMessage(there=self.doc())
+    def messages(self) -> list[ServerMessage]:
+        """What a page is told first."""
+        return [self._lists_message(), StationFetchesMessage(fetches=self._fetch_docs())]
 
     async def look(self) -> None:
         """Has each station that is heard asked for its list, unless it is fresh or under way. Raises BusError."""
@@ -146,7 +149,7 @@ class RecordingsThere:
         """Cancels it, or puts away what it came to. Raises StationsError, BusError."""
         self._wrong.pop(sha256, None)
         await self._nodes.ask_stations(EndFetch(sha256))
-        self._pages.publish(self.message())
+        self._tell_fetches()
 
     # Own ones
 
@@ -200,7 +203,7 @@ class RecordingsThere:
         except Exception as error:
             self._taking[it.sha256] = f"It has come, and is tried to be opened again: {_words(error)}"
             log.warning("Taking in %s of %s: %s", it.name, fetch.station, error_doc(error).what)
-            self._pages.publish(self.message())
+            self._tell_fetches()
             return False
         self._taking.pop(it.sha256, None)
         try:
@@ -222,6 +225,20 @@ class RecordingsThere:
     def _heard(self) -> dict[str, OtherStation]:
         status = self._stations()
         return {} if status is None else {station.name: station for station in status.stations}
+
+    def _lists_message(self) -> StationRecordingsMessage:
+        return StationRecordingsMessage(stations=self._station_docs())
+
+    def _tell_fetches(self) -> None:
+        self._pages.publish(StationFetchesMessage(fetches=self._fetch_docs()))
+
+    def _station_docs(self) -> list[StationRecordingsDoc]:
+        now_s, heard = self._now_mono_s(), self._heard()
+        lists = {each.station: each for each in self._status.stations}
+        return [self._station_doc(name, heard.get(name), lists.get(name), now_s) for name in sorted({*heard, *lists})]
+
+    def _fetch_docs(self) -> list[RecordingFetchDoc]:
+        return [*map(self._fetch_doc, self._status.fetches), *self._wrong_docs()]
 
     def _station_doc(
         self, name: str, heard: OtherStation | None, known: StationRecordings | None, now_s: float

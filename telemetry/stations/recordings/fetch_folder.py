@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
@@ -16,7 +16,7 @@ from typing import Annotated
 import msgspec
 
 from telemetry.errors import StationsError
-from telemetry.recording.disk_space import Space, space_at
+from telemetry.recording.disk_space import Measure, Space, space_at
 from telemetry.stations.recordings.asked_and_given import MOST_RECORDING_BYTES, PIECE_BYTES, file_name
 from telemetry.stations.station_names import checked_name
 from telemetry.topics.station_recordings import RecordingThere
@@ -50,7 +50,7 @@ def note_of(station: str, it: RecordingThere) -> Note:
 class FetchFolder:
     """Blocking calls, for threads. All raise StationsError."""
 
-    def __init__(self, folder: Path, space: Callable[[Path], Space] = space_at) -> None:
+    def __init__(self, folder: Path, space: Measure = space_at) -> None:
         self._folder, self._space = folder, space
 
     def begin(self, note: Note) -> int:

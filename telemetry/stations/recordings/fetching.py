@@ -124,28 +124,20 @@ class Fetching:
         """Whom to ask for what now; ``live``: stations that are heard."""
         async with self._changing:
             await self._write()
-            first = next((each for each in self._fetches.values() if each.state in ("waiting", "fetching")), None)
             for each in self._fetches.values():
-                if each.state == "fetching" and each is not first:
-                    each.state = "waiting"
-            if first is None:
-                return None
-            if first.pieces.is_whole:
-                first.state, first.text = "checking", ""
-                self._to_check.set()
-                return None
-            return self._ask(first, live, now_s)
+                if each.state in ("waiting", "fetching") and each.pieces.is_whole:
+                    each.state, each.text = "checking", ""
+                    self._to_check.set()
+            # In the order in which they were begun, which stays: one that cannot go on holds up none behind it.
+            begun = [each for each in self._fetches.values() if each.state in ("waiting", "fetching")]
+            chosen = next((each for each in begun if each.note.station in live), None)
+            for each in begun:
+                if each is not chosen:
+                    _wait(each, live)
+            return None if chosen is None else self._ask(chosen, now_s)
 
-    def _ask(self, fetch: _Fetch, live: Collection[str], now_s: float) -> tuple[str, PiecesAsk] | None:
+    def _ask(self, fetch: _Fetch, now_s: float) -> tuple[str, PiecesAsk] | None:
         station = fetch.note.station
-        if station not in live:
-            if fetch.state == "fetching" or not fetch.text:
-                fetch.pieces.forget_asked()
-                fetch.heard_s = None
-            fetch.state = "waiting"
-            fetch.text = f"{station} is not heard: it goes on by itself once it is."
-            self._give_way(fetch)
-            return None
         if fetch.state == "waiting":
             fetch.state, fetch.text, fetch.heard_s = "fetching", "", now_s
         if fetch.heard_s is not None and now_s - fetch.heard_s > NOT_ANSWERED_S:
@@ -154,11 +146,6 @@ class Fetching:
             return None
         offsets = fetch.pieces.due(self.bucket, now_s, PIECES_AT_ONCE)
         return (station, PiecesAsk(bytes.fromhex(fetch.note.sha256), tuple(offsets))) if offsets else None
-
-    def _give_way(self, fetch: _Fetch) -> None:
-        """One that cannot go on stands behind those that may."""
-        if any(each.state == "waiting" and each is not fetch for each in self._fetches.values()):
-            self._fetches[fetch.note.sha256] = self._fetches.pop(fetch.note.sha256)
 
     async def _write(self) -> None:
         while self._ready:
@@ -212,6 +199,14 @@ class Fetching:
             )
             for fetch in self._fetches.values()
         )
+
+
+def _wait(fetch: _Fetch, live: Collection[str]) -> None:
+    station = fetch.note.station
+    text = "" if station in live else f"{station} is not heard: it goes on by itself once it is."
+    if text and (fetch.state == "fetching" or fetch.text != text):
+        fetch.pieces.forget_asked()
+    fetch.state, fetch.text, fetch.heard_s = "waiting", text, None
 
 
 def _fail(fetch: _Fetch, text: str) -> None:

@@ -115,18 +115,18 @@ function Station({ station }: { station: StationRecordingsDoc }) {
 
 /** Recordings of other stations: listed by a look, fetched by a press. */
 export function There() {
-  const doc = there.value;
-  const isMet = doc !== null;
+  const stations = there.value;
+  const isMet = stations !== null;
   // Once, when Review is shown: the list costs the line some kilobytes.
   useEffect(() => {
     if (isMet) void askThere();
   }, [isMet]);
-  if (!doc) return null;
-  const all = doc.stations.reduce((sum, { recordings }) => sum + recordings.length, 0);
+  if (!stations) return null;
+  const all = stations.reduce((sum, { recordings }) => sum + recordings.length, 0);
   return (
     <Section id={THERE} title="Other stations" icon="signal" summary={count(all, "recording")} startsOpen>
-      {doc.stations.length === 0 && <p class="hint">No other station is heard.</p>}
-      {doc.stations.map((station) => (
+      {stations.length === 0 && <p class="hint">No other station is heard.</p>}
+      {stations.map((station) => (
         <Station key={station.name} station={station} />
       ))}
       {unlisted.value.map((fetch) => (

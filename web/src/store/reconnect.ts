@@ -7,7 +7,7 @@ import { forgetObstacles, forgetSensing } from "./obstacles";
 import { forgetMoving } from "./moving";
 import { replay, review } from "./review";
 import { forgetStations } from "./stations";
-import { forgetThere } from "./there";
+import { forgetFetches, forgetThere } from "./there";
 import { forgetTraffic } from "./traffic";
 import { forgetTraversability } from "./traversability";
 
@@ -40,6 +40,7 @@ const FORGET: Partial<Record<string, () => void>> = {
   traversability: forgetTraversability,
   stations: forgetStations,
   station_recordings: forgetThere,
+  station_fetches: forgetFetches,
   "obstacles live": () => forgetObstacles("live"),
   "obstacles replay": () => forgetObstacles("replay"),
 };

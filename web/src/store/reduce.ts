@@ -16,7 +16,7 @@ import { radarFiles, runs } from "./studies";
 import { forgetAsked, takeAnswer, takeSelection, takeView } from "./shared";
 import * as state from "./state";
 import { takeStations } from "./stations";
-import { takeThere } from "./there";
+import { fetches, takeLists } from "./there";
 import { traversability } from "./traversability";
 
 /** Takes one message of the stream into the page's state. */
@@ -67,7 +67,10 @@ export function receive(message: ServerMessage): void {
       takeStations(message, performance.now());
       return;
     case "station_recordings":
-      takeThere(message.there, performance.now());
+      takeLists(message.stations, performance.now());
+      return;
+    case "station_fetches":
+      fetches.value = message.fetches;
       return;
     case "alarms":
       alarms.value = message.alarms;

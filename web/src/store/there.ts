@@ -6,20 +6,31 @@ import { now_ms } from "./clock";
 import { order } from "./outcomes";
 import { setError } from "./state";
 
-/** Recordings of other stations, and what is fetched of them; null where none are met. */
-export const there = signal<RecordingsThereDoc | null>(null);
+/** Recordings of other stations, by station; null where none are met. */
+export const there = signal<StationRecordingsDoc[] | null>(null);
+/** What is fetched of them. */
+export const fetches = signal<RecordingFetchDoc[]>([]);
 /** Where errors of them appear. */
 export const THERE = "stations-recordings";
 
 let received_ms = 0;
 
-export function takeThere(doc: RecordingsThereDoc, at_ms: number): void {
+export function takeLists(stations: StationRecordingsDoc[], at_ms: number): void {
   received_ms = at_ms;
-  there.value = doc;
+  there.value = stations;
+}
+
+export function takeThere(doc: RecordingsThereDoc, at_ms: number): void {
+  takeLists(doc.stations, at_ms);
+  fetches.value = doc.fetches;
 }
 
 export const forgetThere = () => {
   there.value = null;
+};
+
+export const forgetFetches = () => {
+  fetches.value = [];
 };
 
 const pathOf = (station: string, sha256: string) =>
@@ -45,14 +56,12 @@ export const endFetch = ({ station, sha256 }: RecordingFetchDoc) =>
   order({ place: THERE, path: pathOf(station, sha256), method: "DELETE" });
 
 export const fetchOf = (sha256: string): RecordingFetchDoc | undefined =>
-  there.value?.fetches.find((fetch) => fetch.sha256 === sha256);
+  fetches.value.find((fetch) => fetch.sha256 === sha256);
 
 /** Fetches that stand in no list: their station is not listed anew since, or lists them no more. */
 export const unlisted = computed(() => {
-  const listed = new Set(
-    there.value?.stations.flatMap((each) => each.recordings.map(({ sha256 }) => sha256)),
-  );
-  return there.value?.fetches.filter(({ sha256 }) => !listed.has(sha256)) ?? [];
+  const listed = new Set(there.value?.flatMap((each) => each.recordings.map(({ sha256 }) => sha256)));
+  return fetches.value.filter(({ sha256 }) => !listed.has(sha256));
 });
 
 /** How a station's list stands: lost first, then how old what is shown is. */

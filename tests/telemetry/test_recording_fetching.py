@@ -1,0 +1,92 @@
+"""Several recordings that are fetched one after the other: who goes on, what is said meanwhile, what is kept."""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import os
+from collections.abc import Awaitable, Callable, Collection
+from pathlib import Path
+
+from telemetry.recording.disk_space import space_at
+from telemetry.stations.recordings.asked_and_given import PIECE_BYTES, PieceGive, PiecesAsk
+from telemetry.stations.recordings.fetch_folder import FetchFolder, Measure
+from telemetry.stations.recordings.fetching import Fetching
+from telemetry.topics.station_recordings import FetchStatus, RecordingThere
+
+TURN_S = 0.5
+
+
+class Fetched:
+    """Fetches into ``folder``; time is the test's own, stations are its words."""
+
+    def __init__(self, folder: Path, space: Measure = space_at) -> None:
+        self.folder, self.now_s, self.live = folder, 100.0, set[str]()
+        self.it = Fetching(FetchFolder(folder, space))
+        self.it.bucket.bytes_per_s = 1e6
+        self.content = dict[bytes, bytes]()
+        self.names = dict[str, str]()
+
+    async def begin(self, station: str, size: int = 4 * PIECE_BYTES, name: str = "a.mcap") -> RecordingThere:
+        content = os.urandom(size)
+        sha256 = hashlib.sha256(content)
+        self.content[sha256.digest()] = content
+        it = RecordingThere(sha256.hexdigest(), name, size, None, None)
+        await self.it.begin(station, it)
+        return it
+
+    async def turn(self) -> tuple[str, PiecesAsk] | None:
+        self.now_s += TURN_S
+        return await self.it.turn(self.live, self.now_s)
+
+    def gives(self, station: str, ask: PiecesAsk, *, junk: bool = False) -> None:
+        for at in ask.offsets:
+            data = self.content[ask.sha256][at : at + PIECE_BYTES]
+            self.it.on_piece(station, PieceGive(ask.sha256, at, bytes(len(data)) if junk else data), self.now_s)
+
+    async def until(self, holds: Callable[[], bool], *, mute: Collection[str] = ()) -> None:
+        """All that are asked answer, without ``mute`` ones."""
+        for _ in range(2000):
+            if holds():
+                return
+            asked = await self.turn()
+            if asked is not None and asked[0] not in mute:
+                self.gives(*asked)
+            await asyncio.sleep(0.001)  # what threads have read is taken up
+        raise AssertionError(f"it does not come to that: {self.statuses}")
+
+    @property
+    def statuses(self) -> tuple[FetchStatus, ...]:
+        return self.it.statuses(self.now_s)
+
+
+def play(fetched: Fetched, whole: Callable[[Fetched], Awaitable[None]]) -> None:
+    async def main() -> None:
+        runs = asyncio.ensure_future(fetched.it.run())
+        try:
+            await whole(fetched)
+        finally:
+            runs.cancel()
+            await asyncio.wait([runs])
+
+    asyncio.run(asyncio.wait_for(main(), 60.0))
+
+
+def test_while_several_wait_nothing_changes_in_what_is_told_of_them(tmp_path: Path) -> None:
+    async def whole(fetched: Fetched) -> None:
+        for station in ("Bravo", "Charlie", "Delta"):
+            await fetched.begin(station)
+        await fetched.turn()
+        told = fetched.statuses
+        assert [each.station for each in told] == ["Bravo", "Charlie", "Delta"]
+        assert all("is not heard: it goes on by itself" in each.text for each in told)
+        for _ in range(7):
+            assert await fetched.turn() is None
+            assert fetched.statuses == told
+        # The one that is heard goes on, whatever stands before it.
+        fetched.live = {"Charlie"}
+        await fetched.until(lambda: fetched.statuses[1].state == "whole")
+        assert [each.state for each in fetched.statuses] == ["waiting", "whole", "waiting"]
+        assert fetched.statuses[1].text == ""
+
+    play(Fetched(tmp_path), whole)
