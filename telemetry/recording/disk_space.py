@@ -12,7 +12,7 @@ from telemetry.errors import RecordingFullError
 _MOST_RESERVED_BYTES = 16 * 1024 * 1024
 _RESERVED_SHARE = 50
 _WARN_S = 15 * 60.0
-_WARN_BYTES = 200 * 1024 * 1024
+WARN_BYTES = 200 * 1024 * 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +55,7 @@ def full(where: str) -> RecordingFullError:
 def running_out(space: Space, rate_bytes_s: float, where: str) -> RecordingFullError | None:
     """What is said before the disk is full."""
     left_s = (space.free - space.reserve) / max(rate_bytes_s, 1.0)
-    if space.free - space.reserve > _WARN_BYTES and left_s > _WARN_S:
+    if space.free - space.reserve > WARN_BYTES and left_s > _WARN_S:
         return None
     minutes = max(0, int(left_s / 60))
     what = f"Only {space.free / 1e6:.0f} MB are left on the disk, enough to record for {minutes} minutes."

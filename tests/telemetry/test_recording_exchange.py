@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from telemetry.errors import StationsError
-from telemetry.recording.disk_space import Space
+from telemetry.recording.disk_space import WARN_BYTES, Space, running_out
 from telemetry.stations.recordings.asked_and_given import (
     MOST_RECORDING_BYTES,
     PIECE_BYTES,
@@ -31,6 +31,8 @@ from telemetry.stations.recordings.fetch_folder import FetchFolder, note_of
 from telemetry.topics.station_recordings import EndFetch, FetchRecording, ListRecordings, RecordingThere
 from tests.telemetry.recording_exchanges import Pair, offered, running
 
+TOTAL_BYTES = 10**9
+KEPT_BYTES = WARN_BYTES + Space(0, TOTAL_BYTES).reserve
 EVIL = (
     "../evil.mcap",
     "/etc/cron.d/evil.mcap",
@@ -249,13 +251,15 @@ def test_malformed_messages_and_foreign_keys_are_refused_and_counted(tmp_path: P
 def test_a_full_disk_is_said_before_and_during_and_what_is_there_is_kept(tmp_path: Path) -> None:
     there = RecordingThere("ab" * 32, "flight.mcap", 10 * PIECE_BYTES, None, None)
     note, free = note_of("Bravo", there), 0
-    folder = FetchFolder(tmp_path, lambda _: Space(free, 10**6))
-    with pytest.raises(StationsError, match="are missing, only 0 MB are free"):
+    folder = FetchFolder(tmp_path, lambda _: Space(free, TOTAL_BYTES))
+    with pytest.raises(StationsError, match=r"are missing\. Only 0 MB are free"):
         folder.begin(note)
-    free = 10**6
+    free = KEPT_BYTES + 10 * PIECE_BYTES
+    with pytest.raises(StationsError, match=r"and 0\.0 MB of others that are being fetched"):
+        folder.begin(note, 1)
     assert folder.begin(note) == 0
     folder.write(note, 0, bytes(PIECE_BYTES))
-    free = 1000
+    free = KEPT_BYTES + PIECE_BYTES - 1
     with pytest.raises(StationsError, match="cannot be fetched"):
         folder.write(note, PIECE_BYTES, bytes(PIECE_BYTES))
     assert folder.have(note) == PIECE_BYTES
@@ -263,6 +267,9 @@ def test_a_full_disk_is_said_before_and_during_and_what_is_there_is_kept(tmp_pat
     with folder.part(note).open("ab") as file:
         file.write(b"half a piece")
     assert (folder.have(note), folder.begun()) == (PIECE_BYTES, [note])
+    # So nothing that is fetched has one's own recorder warn of the disk.
+    assert running_out(Space(KEPT_BYTES + 1, TOTAL_BYTES), 1.0, "") is None
+    assert running_out(Space(KEPT_BYTES, TOTAL_BYTES), 1.0, "") is not None
 
 
 def test_a_disk_that_does_not_take_it_fails_the_fetch_in_words(tmp_path: Path, flight: Path) -> None:

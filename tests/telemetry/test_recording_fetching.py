@@ -8,9 +8,12 @@ import os
 from collections.abc import Awaitable, Callable, Collection
 from pathlib import Path
 
-from telemetry.recording.disk_space import space_at
+import pytest
+
+from telemetry.errors import StationsError
+from telemetry.recording.disk_space import Measure, Space, space_at
 from telemetry.stations.recordings.asked_and_given import PIECE_BYTES, PieceGive, PiecesAsk
-from telemetry.stations.recordings.fetch_folder import FetchFolder, Measure
+from telemetry.stations.recordings.fetch_folder import FetchFolder
 from telemetry.stations.recordings.fetching import Fetching
 from telemetry.topics.station_recordings import FetchStatus, RecordingThere
 
@@ -90,3 +93,39 @@ def test_while_several_wait_nothing_changes_in_what_is_told_of_them(tmp_path: Pa
         assert fetched.statuses[1].text == ""
 
     play(Fetched(tmp_path), whole)
+
+
+def test_the_room_that_others_still_need_is_not_promised_twice(tmp_path: Path) -> None:
+    free = 4_500_000_000
+
+    async def whole(fetched: Fetched) -> None:
+        await fetched.begin("Bravo", name="small.mcap")
+        big = RecordingThere("ab" * 32, "big.mcap", 4_000_000_000, None, None)
+        await fetched.it.begin("Bravo", big)
+        another = RecordingThere("cd" * 32, "another.mcap", 1_000_000_000, None, None)
+        with pytest.raises(
+            StationsError, match=r"and 4000\.0 MB of others that are being fetched\. Only 4500 MB are free"
+        ):
+            await fetched.it.begin("Bravo", another)
+        assert [each.it.name for each in fetched.statuses] == ["small.mcap", "big.mcap"]
+        # One that has failed needs nothing any more.
+        await fetched.it.end(big.sha256)
+        await fetched.it.begin("Bravo", another)
+
+    play(Fetched(tmp_path, lambda _: Space(free, 10**11)), whole)
+
+
+def test_a_disk_that_fills_up_meanwhile_fails_it_before_the_recorder_stops(tmp_path: Path) -> None:
+    free = 10**9
+
+    async def whole(fetched: Fetched) -> None:
+        nonlocal free
+        fetched.live = {"Bravo"}
+        await fetched.begin("Bravo", 40 * PIECE_BYTES)
+        await fetched.until(lambda: fetched.statuses[0].have_bytes > 0)
+        free = 210_000_000
+        await fetched.until(lambda: fetched.statuses[0].state == "failed")
+        assert "Only 210 MB are free, of which 226 MB are kept" in fetched.statuses[0].text
+        assert not Space(free, 10**11).exhausted
+
+    play(Fetched(tmp_path, lambda _: Space(free, 10**11)), whole)

@@ -16,7 +16,7 @@ from typing import Annotated
 import msgspec
 
 from telemetry.errors import StationsError
-from telemetry.recording.disk_space import Measure, Space, space_at
+from telemetry.recording.disk_space import WARN_BYTES, Measure, Space, space_at
 from telemetry.stations.recordings.asked_and_given import MOST_RECORDING_BYTES, PIECE_BYTES, file_name
 from telemetry.stations.station_names import checked_name
 from telemetry.topics.station_recordings import RecordingThere
@@ -53,14 +53,15 @@ class FetchFolder:
     def __init__(self, folder: Path, space: Measure = space_at) -> None:
         self._folder, self._space = folder, space
 
-    def begin(self, note: Note) -> int:
-        """Bytes that are there already. Refused where there is no room for the whole."""
+    def begin(self, note: Note, others_need: int = 0) -> int:
+        """Bytes that are there already. Refused where there is no room for the whole. ``others_need``: bytes that are
+        missing of others that are being fetched."""
         with _told(note.name):
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             have = self.have(note)
             space = self._space(self._folder)
-            if note.size_bytes - have > space.free - 2 * space.reserve:
-                raise _no_room(note.name, note.size_bytes - have, space)
+            if note.size_bytes - have + others_need > _room(space):
+                raise _no_room(note.name, note.size_bytes - have, others_need, space)
             aside = self._of(note, ".new")
             aside.write_bytes(msgspec.json.encode(note))
             aside.chmod(0o600)
@@ -90,8 +91,8 @@ class FetchFolder:
     def write(self, note: Note, at: int, data: bytes) -> None:
         with _told(note.name):
             space = self._space(self._folder)
-            if space.exhausted:
-                raise _no_room(note.name, note.size_bytes - at, space)
+            if len(data) > _room(space):
+                raise _no_room(note.name, note.size_bytes - at, 0, space)
             flags = os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
             file = os.open(self._of(note, ".part"), flags, 0o600)
             try:
@@ -139,9 +140,20 @@ def _told(name: str) -> Iterator[None]:
         ) from error
 
 
-def _no_room(name: str, needs: int, space: Space) -> StationsError:
+def _kept(space: Space) -> int:
+    """What this station's own recorder begins to warn of is its own."""
+    return WARN_BYTES + space.reserve
+
+
+def _room(space: Space) -> int:
+    return space.free - _kept(space)
+
+
+def _no_room(name: str, needs: int, others_need: int, space: Space) -> StationsError:
+    others = f", and {others_need / 1e6:.1f} MB of others that are being fetched" if others_need else ""
     return StationsError(
-        f"{name} cannot be fetched: {needs / 1e6:.1f} MB of it are missing, only {space.free / 1e6:.0f} MB are free.",
+        f"{name} cannot be fetched: {needs / 1e6:.1f} MB of it are missing{others}. Only {space.free / 1e6:.0f} MB are "
+        f"free, of which {_kept(space) / 1e6:.0f} MB are kept for this station's own recordings.",
         advice="Delete recordings that nobody needs, and fetch it again: what is there of it is kept.",
     )
 

@@ -81,7 +81,9 @@ class Fetching:
                     advice="Wait until one has come, or cancel one.",
                 )
             note = note_of(station, it)
-            have = await asyncio.to_thread(self._folder.begin, note)
+            others = (each for each in self._fetches.values() if each is not before and each.state != "failed")
+            missing = sum(each.note.size_bytes - each.pieces.have for each in others)
+            have = await asyncio.to_thread(self._folder.begin, note, missing)
             self._fetches.pop(it.sha256, None)
             self._fetches[it.sha256] = _Fetch(note, Pieces(note.size_bytes, have))
 
