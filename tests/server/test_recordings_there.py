@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from server.errors import BusyError, InUseError, NotReadyError
+from server.errors import BusyError, InUseError, JobCancelledError, NotReadyError, StorageError, WorkerDiedError
 from server.flying.apart import recordings_there
 from server.flying.apart.recordings_there import FRESH_S, RecordingsThere
 from server.library import Library
@@ -56,12 +56,13 @@ class Desk:
 
     def __init__(self, root: Path) -> None:
         self.root, self.shelf, self.answers = root, list[tuple[Path, RecordingDoc]](), list[Any]()
-        self.taken = list[tuple[str, str, str]]()
+        self.taken, self.reads = list[tuple[str, str, str]](), 0
 
     async def shelved(self) -> list[tuple[Path, RecordingDoc]]:
         return self.shelf
 
     async def add_fetched(self, path: str, name: str, station: str) -> RecordingDoc:
+        self.reads += 1
         if self.answers and (error := self.answers.pop(0)) is not None:
             raise error
         self.taken.append((path, name, station))
@@ -181,13 +182,49 @@ def test_one_that_cannot_be_opened_now_is_kept_and_tried_again(tmp_path: Path, m
 
     async def whole() -> None:
         there = There(tmp_path)
-        there.desk.answers = [BusyError("Too many jobs wait."), RuntimeError("a bug"), None]
+        there.desk.answers = [BusyError("Too many jobs wait."), StorageError("The disk is full."), None]
         there.fetched("whole")
         await taking(there, lambda: bool(there.asked))
         assert there.desk.taken == [("/some/where.mcap", "flight.mcap", "Bravo")]
         said = [fetch.text for message in there.told for fetch in getattr(message, "fetches", [])]
         assert any("is tried to be opened again: Too many jobs wait." in text for text in said)
-        assert not any("a bug" in text for text in said)
+        assert any("is tried to be opened again: The disk is full." in text for text in said)
+
+    play(whole)
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (WorkerDiedError("The process that did the work ended."), "The process that did the work ended."),
+        (JobCancelledError("The job was cancelled."), "The job was cancelled."),
+        (RuntimeError("a bug"), "Something in Hedgehop itself went wrong."),
+    ],
+)
+def test_one_that_ends_its_worker_is_read_once_kept_and_read_again_by_a_press(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: Exception, words: str
+) -> None:
+    monkeypatch.setattr(recordings_there, "AGAIN_S", 0.0)
+
+    async def whole() -> None:
+        there = There(tmp_path)
+        there.desk.answers = [error]
+        loop = asyncio.ensure_future(there.it._take_in())
+        for _ in range(50):
+            there.fetched("whole")
+            await asyncio.sleep(0)
+        (fetch,) = there.it.doc().fetches
+        assert (there.desk.reads, there.asked, there.desk.taken) == (1, [], [])
+        assert (fetch.state, fetch.have_bytes) == ("failed", 1000)
+        assert f"could not be opened: {words}" in fetch.text
+        # Again reads the file that is there: nothing is fetched anew.
+        await there.it.fetch("Bravo", IT.sha256)
+        while not there.asked:
+            await asyncio.sleep(0)
+        assert (there.desk.reads, there.asked) == (2, [EndFetch(IT.sha256)])
+        loop.cancel()
+        with suppress(asyncio.CancelledError):
+            await loop
 
     play(whole)
 

@@ -14,7 +14,7 @@ from datetime import datetime
 from typing import Any
 
 from planning.errors import DescribedError
-from server.errors import InUseError, NotReadyError, error_doc, reported
+from server.errors import BusyError, InUseError, NotReadyError, StorageError, error_doc, reported
 from server.flying.recordings import RecordingDesk
 from server.heard.node_states import Nodes
 from server.heard.relay import Relay
@@ -80,6 +80,9 @@ class RecordingsThere:
         self._wrong: dict[str, tuple[RecordingThere, str, str]] = {}
         """By SHA-256: what came and is no recording, from where, and why."""
         self._taking: dict[str, str] = {}
+        """By SHA-256: why it is tried to be opened again."""
+        self._unread: dict[str, str] = {}
+        """By SHA-256: what came whole and could not be opened, and why; it is kept until somebody presses *Again*."""
         self._told_lists: object = None
         self._told_fetches: tuple[object, object] = None, None
         self._told_s = 0.0
@@ -143,11 +146,16 @@ class RecordingsThere:
         if heard is not None and heard.state == "lost":
             raise NotReadyError(f"{station} is not heard.", advice="Fetch it once it is heard again.")
         self._wrong.pop(sha256, None)
+        if self._unread.pop(sha256, None) is not None and self._has_whole(station, sha256):
+            self._came.set()
+            self._tell_fetches()
+            return
         await self._nodes.ask_stations(FetchRecording(station, sha256))
 
     async def end(self, sha256: str) -> None:
         """Cancels it, or puts away what it came to. Raises StationsError, BusError."""
         self._wrong.pop(sha256, None)
+        self._unread.pop(sha256, None)
         await self._nodes.ask_stations(EndFetch(sha256))
         self._tell_fetches()
 
@@ -187,7 +195,7 @@ class RecordingsThere:
             await self._came.wait()
             self._came.clear()
             for fetch in [each for each in self._status.fetches if self._is_done(each)]:
-                if not await self._take(fetch):
+                if self._is_done(fetch) and not await self._take(fetch):
                     await asyncio.sleep(AGAIN_S)
                     self._came.set()
 
@@ -200,11 +208,19 @@ class RecordingsThere:
                 self._here[_key(fetch.station, it)] = doc.id
         except RecordingError as error:
             self._wrong[it.sha256] = it, fetch.station, f"It came whole, and is no recording: {_words(error)}"
-        except Exception as error:
+        except (BusyError, StorageError) as error:
             self._taking[it.sha256] = f"It has come, and is tried to be opened again: {_words(error)}"
-            log.warning("Taking in %s of %s: %s", it.name, fetch.station, error_doc(error).what)
+            log.warning("Taking in %s of %s: %s", it.name, fetch.station, error.what)
             self._tell_fetches()
             return False
+        except Exception as error:
+            # It may be the file: read again by itself it would end a worker every ten seconds.
+            doing = f"Taking in {it.name} of {fetch.station}"
+            log.warning("%s: %s", doing, reported(error, log, doing).what)
+            self._unread[it.sha256] = f"It came whole, and could not be opened: {_words(error)} It is kept."
+            self._taking.pop(it.sha256, None)
+            self._tell_fetches()
+            return True
         self._taking.pop(it.sha256, None)
         try:
             await self._nodes.ask_stations(EndFetch(it.sha256))
@@ -215,7 +231,14 @@ class RecordingsThere:
 
     def _is_done(self, fetch: FetchStatus) -> bool:
         """It came whole; or it came before, and the node was not told in time that it was taken in."""
+        if fetch.it.sha256 in self._unread:
+            return False
         return fetch.state == "whole" or (fetch.have_bytes == 0 and self._is_here(fetch))
+
+    def _has_whole(self, station: str, sha256: str) -> bool:
+        return any(
+            (each.station, each.it.sha256, each.state) == (station, sha256, "whole") for each in self._status.fetches
+        )
 
     def _is_here(self, fetch: FetchStatus) -> bool:
         return _key(fetch.station, fetch.it) in self._here
@@ -268,15 +291,16 @@ class RecordingsThere:
 
     def _fetch_doc(self, fetch: FetchStatus) -> RecordingFetchDoc:
         left = fetch.it.size_bytes - fetch.have_bytes
+        unread = self._unread.get(fetch.it.sha256) if fetch.state == "whole" else None
         return RecordingFetchDoc(
             station=fetch.station,
             sha256=fetch.it.sha256,
             name=fetch.it.name,
             bytes=fetch.it.size_bytes,
             have_bytes=fetch.have_bytes,
-            state=fetch.state,
+            state=fetch.state if unread is None else "failed",
             left_s=left / fetch.bytes_per_s if fetch.bytes_per_s > 0 and fetch.state == "fetching" else None,
-            text=self._taking.get(fetch.it.sha256, fetch.text),
+            text=unread or self._taking.get(fetch.it.sha256, fetch.text),
         )
 
     def _wrong_docs(self) -> list[RecordingFetchDoc]:
