@@ -12,9 +12,9 @@ import pytest
 
 from telemetry.errors import StationsError
 from telemetry.recording.disk_space import Measure, Space, space_at
-from telemetry.stations.recordings.asked_and_given import PIECE_BYTES, PieceGive, PiecesAsk
+from telemetry.stations.recordings.asked_and_given import LOOKING, PIECE_BYTES, NoPiece, PieceGive, PiecesAsk
 from telemetry.stations.recordings.fetch_folder import FetchFolder
-from telemetry.stations.recordings.fetching import Fetching
+from telemetry.stations.recordings.fetching import NOT_ANSWERED_S, Fetching
 from telemetry.topics.station_recordings import FetchStatus, RecordingThere
 
 TURN_S = 0.5
@@ -24,7 +24,7 @@ class Fetched:
     """Fetches into ``folder``; time is the test's own, stations are its words."""
 
     def __init__(self, folder: Path, space: Measure = space_at) -> None:
-        self.folder, self.now_s, self.live = folder, 100.0, set[str]()
+        self.folder, self.now_s, self.turn_s, self.live = folder, 100.0, TURN_S, set[str]()
         self.it = Fetching(FetchFolder(folder, space))
         self.it.bucket.bytes_per_s = 1e6
         self.content = dict[bytes, bytes]()
@@ -39,7 +39,7 @@ class Fetched:
         return it
 
     async def turn(self) -> tuple[str, PiecesAsk] | None:
-        self.now_s += TURN_S
+        self.now_s += self.turn_s
         return await self.it.turn(self.live, self.now_s)
 
     def gives(self, station: str, ask: PiecesAsk, *, junk: bool = False) -> None:
@@ -129,3 +129,76 @@ def test_a_disk_that_fills_up_meanwhile_fails_it_before_the_recorder_stops(tmp_p
         assert not Space(free, 10**11).exhausted
 
     play(Fetched(tmp_path, lambda _: Space(free, 10**11)), whole)
+
+
+def test_a_station_that_does_not_answer_holds_up_nobody_and_is_asked_again(tmp_path: Path) -> None:
+    async def whole(fetched: Fetched) -> None:
+        # A turn has one piece.
+        fetched.live, fetched.it.bucket.bytes_per_s, fetched.turn_s = {"Mute", "Good"}, 8000.0, 2.0
+        for _ in range(7):
+            await fetched.begin("Mute", name="mute.mcap")
+        await fetched.begin("Good", 90 * PIECE_BYTES, "good.mcap")
+        await fetched.turn()
+        assert fetched.statuses[-1].text == "It waits for mute.mcap of Mute."
+        began_s = fetched.now_s
+        await fetched.until(lambda: fetched.statuses[-1].state == "whole", mute={"Mute"})
+        # Four fifths of the time are Good's.
+        assert fetched.now_s - began_s < NOT_ANSWERED_S + 90 * 2.0 * 1.5
+        for each in fetched.statuses[:-1]:
+            assert "Mute does not answer about recordings" in each.text
+            assert "It is asked again." in each.text
+        # Alone it is asked on, and goes on once it answers.
+        await fetched.until(lambda: all(each.state == "whole" for each in fetched.statuses))
+        assert {each.text for each in fetched.statuses} == {""}
+
+    play(Fetched(tmp_path), whole)
+
+
+def test_of_two_silent_stations_each_is_asked(tmp_path: Path) -> None:
+    async def whole(fetched: Fetched) -> None:
+        fetched.live = {"Mute", "Late"}
+        await fetched.begin("Mute")
+        await fetched.begin("Late")
+        fetched.turn_s = 5.0
+        for _ in range(20):
+            await fetched.turn()
+        await fetched.until(lambda: fetched.statuses[1].state == "whole", mute={"Mute"})
+
+    play(Fetched(tmp_path), whole)
+
+
+def test_while_one_is_looked_for_there_others_go_on_and_that_is_said(tmp_path: Path) -> None:
+    async def whole(fetched: Fetched) -> None:
+        fetched.live = {"Looks", "Good"}
+        looked = await fetched.begin("Looks")
+        await fetched.begin("Good", 40 * PIECE_BYTES)
+        for _ in range(60):
+            asked = await fetched.turn()
+            if asked is not None and asked[0] == "Looks":
+                fetched.it.on_none("Looks", NoPiece(bytes.fromhex(looked.sha256), LOOKING), fetched.now_s)
+            elif asked is not None:
+                fetched.gives(*asked)
+                assert "it is still being looked for there" in fetched.statuses[0].text
+            await asyncio.sleep(0.001)
+        assert [each.state for each in fetched.statuses][1] == "whole"
+        await fetched.until(lambda: fetched.statuses[0].state == "whole")
+
+    play(Fetched(tmp_path), whole)
+
+
+def test_a_piece_under_way_counts_though_another_one_has_its_turn_now(tmp_path: Path) -> None:
+    async def whole(fetched: Fetched) -> None:
+        fetched.live = {"Good"}
+        await fetched.begin("Back", 40 * PIECE_BYTES)
+        good = await fetched.begin("Good", 40 * PIECE_BYTES)
+        asked = await fetched.turn()
+        assert asked is not None
+        fetched.live = {"Back", "Good"}
+        await fetched.turn()
+        assert [each.state for each in fetched.statuses] == ["fetching", "waiting"]
+        fetched.gives(*asked)
+        assert fetched.statuses[1].have_bytes == len(asked[1].offsets) * PIECE_BYTES > 0
+        await fetched.until(lambda: {each.state for each in fetched.statuses} == {"whole"})
+        assert Path(fetched.statuses[1].path).read_bytes() == fetched.content[bytes.fromhex(good.sha256)]
+
+    play(Fetched(tmp_path), whole)

@@ -23,7 +23,9 @@ from telemetry.stations.recordings.pieces import Bucket, Pieces
 from telemetry.topics.station_recordings import FetchState, FetchStatus, RecordingThere
 
 MOST_FETCHES = 8
-LOOKS_AGAIN_S, NOT_ANSWERED_S, RATE_OVER_S = 5.0, 20.0, 10.0
+LOOKS_AGAIN_S, NOT_ANSWERED_S, RATE_OVER_S = 5.0, 15.0, 10.0
+SILENT_AGAIN_S = 60.0
+"""After so long a station that does not answer is asked again, while others' recordings wait."""
 
 
 @dataclass(slots=True)
@@ -34,6 +36,8 @@ class _Fetch:
     text: str = ""
     path: str = ""
     not_before_s: float = 0.0
+    is_looked_for: bool = False
+    """There, where it is not found yet."""
     heard_s: float | None = None
     """When a piece came last, or the first was asked for; None: not since its station is heard."""
     came: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=64))
@@ -50,6 +54,8 @@ class Fetching:
         self._changing = asyncio.Lock()
         self._ready: deque[tuple[_Fetch, int, bytes]] = deque()
         self._to_check = asyncio.Event()
+        self._silent_until_s: dict[str, float] = {}
+        """By station: it does not answer, and others go first until then."""
         self.bucket = Bucket(0.0)
 
     async def run(self) -> None:
@@ -104,8 +110,7 @@ class Fetching:
         except StationsError as error:
             _fail(fetch, f"What {station} sends is not what was asked for: {error.what} Call its crew.")
             return
-        fetch.heard_s = now_s
-        fetch.text = ""
+        self._on_answer(fetch, now_s)
         if data:
             self._ready.append((fetch, at, data))
             fetch.came.append((now_s, fetch.pieces.have))
@@ -115,10 +120,9 @@ class Fetching:
         if fetch is None:
             return
         fetch.pieces.forget_asked()
-        fetch.heard_s = now_s
+        self._on_answer(fetch, now_s)
         if given.why == LOOKING:
-            fetch.not_before_s = now_s + LOOKS_AGAIN_S
-            fetch.text = f"{station} is asked again: {WHY[LOOKING]}."
+            fetch.not_before_s, fetch.is_looked_for = now_s + LOOKS_AGAIN_S, True
             return
         _fail(fetch, f"{station} does not have it any more: {WHY[given.why]}. Ask for its list anew.")
 
@@ -130,22 +134,53 @@ class Fetching:
                 if each.state in ("waiting", "fetching") and each.pieces.is_whole:
                     each.state, each.text = "checking", ""
                     self._to_check.set()
+            for station in [each for each in self._silent_until_s if each not in live]:
+                del self._silent_until_s[station]
             # In the order in which they were begun, which stays: one that cannot go on holds up none behind it.
             begun = [each for each in self._fetches.values() if each.state in ("waiting", "fetching")]
-            chosen = next((each for each in begun if each.note.station in live), None)
+            chosen = self._chosen([each for each in begun if each.note.station in live], now_s)
             for each in begun:
                 if each is not chosen:
-                    _wait(each, live)
+                    self._wait(each, live, chosen)
             return None if chosen is None else self._ask(chosen, now_s)
+
+    def _chosen(self, heard: list[_Fetch], now_s: float) -> _Fetch | None:
+        """The first that may go on; where none may, of those whose station does not answer the one that was longest not
+        asked."""
+        ready = [each for each in heard if now_s >= each.not_before_s]
+        silent_until_s = self._silent_until_s
+        return min(ready, key=lambda each: max(now_s, silent_until_s.get(each.note.station, now_s)), default=None)
+
+    def _wait(self, fetch: _Fetch, live: Collection[str], ahead: _Fetch | None) -> None:
+        """Says what it waits for."""
+        station = fetch.note.station
+        if station not in live:
+            text = f"{station} is not heard: it goes on by itself once it is."
+            if fetch.text != text:
+                fetch.pieces.forget_asked()
+        else:
+            turn = "" if ahead is None else f"It waits for {ahead.note.name} of {ahead.note.station}."
+            text = self._why_late(fetch) or turn
+        fetch.state, fetch.text, fetch.heard_s = "waiting", text, None
+
+    def _why_late(self, fetch: _Fetch) -> str:
+        station = fetch.note.station
+        if station in self._silent_until_s:
+            return f"{NOT_ANSWERED.format(station=station)} It is asked again."
+        return f"{station} is asked again: {WHY[LOOKING]}." if fetch.is_looked_for else ""
+
+    def _on_answer(self, fetch: _Fetch, now_s: float) -> None:
+        self._silent_until_s.pop(fetch.note.station, None)
+        fetch.heard_s, fetch.is_looked_for = now_s, False
 
     def _ask(self, fetch: _Fetch, now_s: float) -> tuple[str, PiecesAsk] | None:
         station = fetch.note.station
         if fetch.state == "waiting":
-            fetch.state, fetch.text, fetch.heard_s = "fetching", "", now_s
+            fetch.state, fetch.heard_s = "fetching", now_s
         if fetch.heard_s is not None and now_s - fetch.heard_s > NOT_ANSWERED_S:
-            fetch.text = f"{NOT_ANSWERED.format(station=station)} It is asked on."
-        if now_s < fetch.not_before_s:
-            return None
+            fetch.heard_s = now_s
+            self._silent_until_s[station] = now_s + SILENT_AGAIN_S
+        fetch.text = self._why_late(fetch)
         offsets = fetch.pieces.due(self.bucket, now_s, PIECES_AT_ONCE)
         return (station, PiecesAsk(bytes.fromhex(fetch.note.sha256), tuple(offsets))) if offsets else None
 
@@ -184,9 +219,10 @@ class Fetching:
         )
 
     def _asked_of(self, station: str, sha256: bytes) -> _Fetch | None:
-        """One that goes on, and comes from there."""
+        """One that goes on, or waits while pieces that it asked for are under way, and comes from there."""
         fetch = self._fetches.get(sha256.hex())
-        return fetch if fetch is not None and fetch.note.station == station and fetch.state == "fetching" else None
+        goes_on = fetch is not None and fetch.note.station == station and fetch.state in ("fetching", "waiting")
+        return fetch if goes_on else None
 
     def statuses(self, now_s: float) -> tuple[FetchStatus, ...]:
         return tuple(
@@ -201,14 +237,6 @@ class Fetching:
             )
             for fetch in self._fetches.values()
         )
-
-
-def _wait(fetch: _Fetch, live: Collection[str]) -> None:
-    station = fetch.note.station
-    text = "" if station in live else f"{station} is not heard: it goes on by itself once it is."
-    if text and (fetch.state == "fetching" or fetch.text != text):
-        fetch.pieces.forget_asked()
-    fetch.state, fetch.text, fetch.heard_s = "waiting", text, None
 
 
 def _fail(fetch: _Fetch, text: str) -> None:

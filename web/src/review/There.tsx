@@ -50,7 +50,8 @@ function Fetch({ fetch }: { fetch: RecordingFetchDoc }) {
           onClick={() => void endFetch(fetch)}
         />
       </div>
-      {fetch.text && (
+      {fetch.text && fetch.state === "waiting" && <p class="hint">{fetch.text}</p>}
+      {fetch.text && fetch.state !== "waiting" && (
         <p class="fault">
           <Icon name="warning" size={16} /> {fetch.text}
         </p>
