@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import errno
 import hashlib
 import os
+import threading
 from collections.abc import Awaitable, Callable, Collection
 from pathlib import Path
 
@@ -12,8 +14,9 @@ import pytest
 
 from telemetry.errors import StationsError
 from telemetry.recording.disk_space import Measure, Space, space_at
-from telemetry.stations.recordings.asked_and_given import LOOKING, PIECE_BYTES, NoPiece, PieceGive, PiecesAsk
-from telemetry.stations.recordings.fetch_folder import FetchFolder
+from telemetry.stations.recordings import fetching, offering
+from telemetry.stations.recordings.asked_and_given import LOOKING, PIECE_BYTES, REMOVED, NoPiece, PieceGive, PiecesAsk
+from telemetry.stations.recordings.fetch_folder import FetchFolder, Note
 from telemetry.stations.recordings.fetching import NOT_ANSWERED_S, Fetching
 from telemetry.topics.station_recordings import FetchStatus, RecordingThere
 
@@ -200,5 +203,101 @@ def test_a_piece_under_way_counts_though_another_one_has_its_turn_now(tmp_path: 
         assert fetched.statuses[1].have_bytes == len(asked[1].offsets) * PIECE_BYTES > 0
         await fetched.until(lambda: {each.state for each in fetched.statuses} == {"whole"})
         assert Path(fetched.statuses[1].path).read_bytes() == fetched.content[bytes.fromhex(good.sha256)]
+
+    play(Fetched(tmp_path), whole)
+
+
+def test_a_turn_that_is_cancelled_while_it_writes_loses_no_piece(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where the router is lost and the wire opened anew."""
+    slow = threading.Event()
+    write = FetchFolder.write
+
+    def writes(self: FetchFolder, note: Note, at: int, data: bytes) -> None:
+        slow.wait(30.0)
+        write(self, note, at, data)
+
+    async def whole(fetched: Fetched) -> None:
+        fetched.live = {"Bravo"}
+        it = await fetched.begin("Bravo", 10 * PIECE_BYTES)
+        asked = await fetched.turn()
+        assert asked is not None
+        fetched.gives(*asked)
+        # The thread has not begun: the write is cancelled before it is done.
+        full = [asyncio.ensure_future(asyncio.to_thread(slow.wait, 30.0)) for _ in range(64)]
+        turn = asyncio.ensure_future(fetched.turn())
+        for _ in range(20):
+            await asyncio.sleep(0)
+        turn.cancel()
+        await asyncio.wait([turn])
+        slow.set()
+        await asyncio.gather(*full)
+        await fetched.until(lambda: fetched.statuses[0].state in ("whole", "failed"))
+        assert (fetched.statuses[0].state, fetched.statuses[0].text) == ("whole", "")
+        assert Path(fetched.statuses[0].path).read_bytes() == fetched.content[bytes.fromhex(it.sha256)]
+
+    monkeypatch.setattr(FetchFolder, "write", writes)
+    play(Fetched(tmp_path), whole)
+
+
+def test_a_disk_here_that_cannot_be_read_deletes_nothing_and_blames_no_other_station(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fails = True
+
+    async def hashed(path: Path, size: int) -> bytes | None:
+        if fails:
+            raise OSError(errno.EIO, "Input/output error")
+        return await offering.hashed(path, size)
+
+    monkeypatch.setattr(fetching, "hashed", hashed)
+
+    async def whole(fetched: Fetched) -> None:
+        nonlocal fails
+        fetched.live = {"Bravo"}
+        it = await fetched.begin("Bravo")
+        await fetched.until(lambda: fetched.statuses[0].state == "failed")
+        (status,) = fetched.statuses
+        assert "cannot be read here (Input/output error)" in status.text
+        assert "Bravo" not in status.text
+        assert (status.have_bytes, {path.suffix for path in tmp_path.iterdir()}) == (it.size_bytes, {".json", ".part"})
+        fails, fetched.live = False, set()
+        await fetched.it.begin("Bravo", it)
+        await fetched.until(lambda: fetched.statuses[0].state == "whole")
+
+    play(Fetched(tmp_path), whole)
+
+
+def test_bytes_of_one_station_are_not_taken_for_anothers(tmp_path: Path) -> None:
+    async def whole(fetched: Fetched) -> None:
+        fetched.live = {"Evil", "Good"}
+        it = await fetched.begin("Evil", 10 * PIECE_BYTES)
+        for _ in range(3):
+            asked = await fetched.turn()
+            assert asked is not None
+            fetched.gives(*asked, junk=True)
+        await fetched.turn()
+        fetched.it.on_none("Evil", NoPiece(bytes.fromhex(it.sha256), REMOVED), fetched.now_s)
+        assert fetched.statuses[0].have_bytes > 0
+        await fetched.it.begin("Good", it)
+        assert fetched.statuses[0].have_bytes == 0
+        await fetched.until(lambda: fetched.statuses[0].state in ("whole", "failed"))
+        assert (fetched.statuses[0].state, fetched.statuses[0].text) == ("whole", "")
+
+    play(Fetched(tmp_path), whole)
+
+
+def test_of_what_was_deleted_nothing_is_there(tmp_path: Path) -> None:
+    async def whole(fetched: Fetched) -> None:
+        fetched.live = {"Evil"}
+        await fetched.begin("Evil")
+        while fetched.statuses[0].state != "failed":
+            asked = await fetched.turn()
+            if asked is not None:
+                fetched.gives(*asked, junk=True)
+            await asyncio.sleep(0.001)
+        assert "What came from Evil is not a.mcap" in fetched.statuses[0].text
+        assert (fetched.statuses[0].have_bytes, list(tmp_path.iterdir())) == (0, [])
 
     play(Fetched(tmp_path), whole)

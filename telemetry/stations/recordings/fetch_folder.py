@@ -58,6 +58,10 @@ class FetchFolder:
         missing of others that are being fetched."""
         with _told(note.name):
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            before = _read_note(self._of(note, ".json"))
+            if before is None or before.station != note.station:
+                # Of another station: whether these bytes are right shows only once all are there.
+                self._of(note, ".part").unlink(missing_ok=True)
             have = self.have(note)
             space = self._space(self._folder)
             if note.size_bytes - have + others_need > _room(space):

@@ -186,19 +186,31 @@ class Fetching:
 
     async def _write(self) -> None:
         while self._ready:
-            fetch, at, data = self._ready.popleft()
-            if fetch.state == "failed" or self._fetches.get(fetch.note.sha256) is not fetch:
-                continue
-            try:
-                await asyncio.to_thread(self._folder.write, fetch.note, at, data)
-            except StationsError as error:
-                _fail(fetch, f"{error.what} {error.advice}")
+            fetch, at, data = self._ready[0]
+            if fetch.state != "failed" and self._fetches.get(fetch.note.sha256) is fetch:
+                try:
+                    await asyncio.to_thread(self._folder.write, fetch.note, at, data)
+                except StationsError as error:
+                    _fail(fetch, f"{error.what} {error.advice}")
+            # Only now: where the turn is cancelled, for a wire that is opened anew, it is written again.
+            self._ready.popleft()
 
     async def _check(self, fetch: _Fetch) -> None:
         note = fetch.note
-        digest = await hashed(self._folder.part(note), note.size_bytes)
+        digest, fault = None, ""
+        try:
+            digest = await hashed(self._folder.part(note), note.size_bytes)
+        except OSError as error:
+            fault = (
+                f"{note.name} has come and cannot be read here ({error.strerror or error}): see to this station's own "
+                "disk. What came is kept: Again reads it once more."
+            )
         async with self._changing:
-            if self._fetches.get(note.sha256) is fetch:
+            if self._fetches.get(note.sha256) is not fetch:
+                return
+            if fault:
+                _fail(fetch, fault)
+            else:
                 await self._settle(fetch, digest)
 
     async def _settle(self, fetch: _Fetch, digest: bytes | None) -> None:
@@ -211,6 +223,13 @@ class Fetching:
             await asyncio.to_thread(self._folder.delete, note)
         except StationsError as error:
             _fail(fetch, f"{error.what} {error.advice}")
+            return
+        fetch.pieces = Pieces(note.size_bytes, 0)
+        if digest is None:
+            _fail(
+                fetch,
+                f"{note.name} lies here in another length than it was written in: it was deleted. Fetch it again.",
+            )
             return
         _fail(
             fetch,

@@ -157,7 +157,10 @@ class Offering:
         if look is None or not 0 < look[1] <= MOST_RECORDING_BYTES:
             self._unreadable[of.path] = look or (0, 0, 0)
             return
-        sha256 = await hashed(path, look[1])
+        try:
+            sha256 = await hashed(path, look[1])
+        except OSError:
+            sha256 = None
         if sha256 is None or await asyncio.to_thread(_look, path) != look:
             self._unreadable[of.path] = look
             _log.warning("%s cannot be read or has changed meanwhile: other stations are not told of it.", path.name)
@@ -167,7 +170,7 @@ class Offering:
 
 
 async def hashed(path: Path, size: int) -> bytes | None:
-    """SHA-256 of a file of that size, read in a thread; None: it cannot be read, or has another size."""
+    """SHA-256 of a file of that size, read in a thread; None: it has another size. Raises OSError."""
     digest = hashlib.sha256()
 
     def read_on(at: int) -> int:
@@ -178,11 +181,8 @@ async def hashed(path: Path, size: int) -> bytes | None:
         return len(block)
 
     at = 0
-    try:
-        while at <= size and (read := await asyncio.to_thread(read_on, at)):
-            at += read
-    except OSError:
-        return None
+    while at <= size and (read := await asyncio.to_thread(read_on, at)):
+        at += read
     return digest.digest() if at == size else None
 
 
