@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from telemetry.errors import StationsError
 from telemetry.recording.disk_space import WARN_BYTES, Space, running_out
 from telemetry.stations.recordings.asked_and_given import (
+    MOST_OFFERED,
     MOST_RECORDING_BYTES,
     PIECE_BYTES,
     ListGive,
@@ -28,7 +29,7 @@ from telemetry.stations.recordings.asked_and_given import (
     sent_by,
 )
 from telemetry.stations.recordings.fetch_folder import FetchFolder, note_of
-from telemetry.topics.station_recordings import EndFetch, FetchRecording, ListRecordings, RecordingThere
+from telemetry.topics.station_recordings import EndFetch, FetchRecording, ListRecordings, OwnRecordings, RecordingThere
 from tests.telemetry.recording_exchanges import Pair, offered, running
 
 TOTAL_BYTES = 10**9
@@ -167,6 +168,33 @@ def test_a_file_that_is_removed_or_changed_there_ends_it_in_words(tmp_path: Path
             flight.write_bytes(os.urandom(flight.stat().st_size))
         failed = await pair.fetched()
         assert (failed.state, f"it was {becomes} there" in failed.text) == ("failed", True)
+
+    with_pair(tmp_path, whole)
+
+
+def test_one_that_newer_ones_push_off_the_list_is_given_on_until_it_is_gone(tmp_path: Path) -> None:
+    async def whole(pair: Pair) -> None:
+        paths = [tmp_path / f"{n}.mcap" for n in range(MOST_OFFERED + 1)]
+        for path in paths:
+            path.write_bytes(os.urandom(2000 * PIECE_BYTES if path is paths[-1] else 10))
+        pair.alpha.on_own(OwnRecordings(0.0, is_on=True, bytes_per_s=100_000))
+        pair.offer(*map(offered, paths[1:]))
+        oldest = (await pair.listed(MOST_OFFERED)).recordings[-1]
+        await pair.alpha.handle(FetchRecording("Bravo", oldest.sha256))
+        await pair.until(lambda: pair.fetch.have_bytes > 0)
+        # Bravo has landed, and is asked for its list: that has the newest alone.
+        pair.offer(*map(offered, paths))
+        await pair.alpha.handle(ListRecordings("Bravo"))
+        await pair.until(lambda: pair.list.state == "listed" and pair.list.recordings[0].name == "0.mcap")
+        assert oldest.sha256 not in {each.sha256 for each in pair.list.recordings}
+        assert 0 < pair.fetch.have_bytes < oldest.size_bytes
+        had = pair.fetch.have_bytes
+        await pair.until(lambda: pair.fetch.have_bytes > had or pair.fetch.state == "failed")
+        assert pair.fetch.state == "fetching"
+        # Deleted there, it is not Bravo's any more.
+        pair.offer(*map(offered, paths[:-1]))
+        failed = await pair.fetched()
+        assert (failed.state, "it was removed there" in failed.text) == ("failed", True)
 
     with_pair(tmp_path, whole)
 

@@ -65,6 +65,8 @@ class Offering:
     def __init__(self) -> None:
         self._own = OwnRecordings(0.0, is_on=False, bytes_per_s=0)
         self._read: dict[str, _Read] = {}
+        self._paths: set[str] = set()
+        """Of all that are its own, the listed ones among them."""
         self._unreadable: dict[str, Look] = {}
         self._wanted = asyncio.Event()
         self._whole = False
@@ -79,6 +81,7 @@ class Offering:
     def on_own(self, own: OwnRecordings) -> None:
         if own.recordings != self._own.recordings:
             self._whole = False
+            self._paths = {each.path for each in own.recordings}
         self._own, self._bucket.bytes_per_s = own, float(own.bytes_per_s)
 
     async def run(self) -> None:
@@ -89,7 +92,8 @@ class Offering:
             offered = self._offered
             for each in offered:
                 await self._hash(each)
-            self._read = {path: read for path, read in self._read.items() if path in {each.path for each in offered}}
+            # One that newer ones have pushed off the list is given on: somebody may be fetching it.
+            self._read = {path: read for path, read in self._read.items() if path in self._paths}
             self._whole = offered == self._offered
 
     def on_asked(self, station: str, asked: Asked) -> None:
@@ -130,7 +134,9 @@ class Offering:
         sha256, offset = asked
         if not self._own.is_on:
             return NoPiece(sha256, OFF)
-        found = next((read for read in self._listed() if read.offer.sha256 == sha256), None)
+        found = next(
+            (read for path, read in self._read.items() if path in self._paths and read.offer.sha256 == sha256), None
+        )
         if found is None:
             self._wanted.set()
             return NoPiece(sha256, REMOVED if self._whole else LOOKING)
