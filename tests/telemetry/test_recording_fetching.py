@@ -301,3 +301,17 @@ def test_of_what_was_deleted_nothing_is_there(tmp_path: Path) -> None:
         assert (fetched.statuses[0].have_bytes, list(tmp_path.iterdir())) == (0, [])
 
     play(Fetched(tmp_path), whole)
+
+
+def test_the_same_bytes_are_fetched_from_one_station_and_the_other_press_is_told(tmp_path: Path) -> None:
+    async def whole(fetched: Fetched) -> None:
+        it = await fetched.begin("Bravo")
+        with pytest.raises(StationsError, match="is being fetched from Bravo"):
+            await fetched.it.begin("Charlie", it)
+        await fetched.it.begin("Bravo", it)
+        assert [each.station for each in fetched.statuses] == ["Bravo"]
+        await fetched.it.end(it.sha256)
+        await fetched.it.begin("Charlie", it)
+        assert [each.station for each in fetched.statuses] == ["Charlie"]
+
+    play(Fetched(tmp_path), whole)

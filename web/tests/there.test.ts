@@ -93,8 +93,11 @@ describe("recordings of other stations", () => {
   test("what the stream tells stands beside its recording, or alone where no list has it", () => {
     receive({ v: 1, type: "station_recordings", stations: [bravo] });
     receive({ v: 1, type: "station_fetches", fetches: [fetching] });
-    expect(fetchOf(SHA)).toEqual(fetching);
+    expect(fetchOf("Bravo", SHA)).toEqual(fetching);
+    expect(fetchOf("Charlie", SHA)).toBeUndefined();
     expect(unlisted.value).toEqual([]);
+    receive({ v: 1, type: "station_recordings", stations: [{ ...bravo, name: "Charlie" }] });
+    expect(unlisted.value).toEqual([fetching]);
     receive({ v: 1, type: "station_recordings", stations: [] });
     expect(unlisted.value).toEqual([fetching]);
     receive({ v: 1, type: "station_fetches", fetches: [] });

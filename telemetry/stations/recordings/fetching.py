@@ -80,6 +80,11 @@ class Fetching:
         async with self._changing:
             before = self._fetches.get(it.sha256)
             if before is not None and before.state != "failed":
+                if before.note.station != station:
+                    raise StationsError(
+                        f"{it.name} is being fetched from {before.note.station}, the same bytes.",
+                        advice="Wait for it, or cancel that one first.",
+                    )
                 return
             if before is None and len(self._fetches) >= MOST_FETCHES:
                 raise StationsError(

@@ -61,7 +61,7 @@ function Fetch({ fetch }: { fetch: RecordingFetchDoc }) {
 }
 
 function Row({ recording, station }: { recording: RecordingThereDoc; station: StationRecordingsDoc }) {
-  const fetch = fetchOf(recording.sha256);
+  const fetch = fetchOf(station.name, recording.sha256);
   const here = recording.recording_id;
   const isOpen = here !== null && review.value?.recording.id === here;
   const facts = [

@@ -55,13 +55,18 @@ export const fetchThere = (station: string, sha256: string) =>
 export const endFetch = ({ station, sha256 }: RecordingFetchDoc) =>
   order({ place: THERE, path: pathOf(station, sha256), method: "DELETE" });
 
-export const fetchOf = (sha256: string): RecordingFetchDoc | undefined =>
-  fetches.value.find((fetch) => fetch.sha256 === sha256);
+/** Two stations may offer the same bytes. */
+const keyOf = (station: string, sha256: string) => `${station} ${sha256}`;
+
+export const fetchOf = (station: string, sha256: string): RecordingFetchDoc | undefined =>
+  fetches.value.find((fetch) => fetch.station === station && fetch.sha256 === sha256);
 
 /** Fetches that stand in no list: their station is not listed anew since, or lists them no more. */
 export const unlisted = computed(() => {
-  const listed = new Set(there.value?.flatMap((each) => each.recordings.map(({ sha256 }) => sha256)));
-  return fetches.value.filter(({ sha256 }) => !listed.has(sha256));
+  const listed = new Set(
+    there.value?.flatMap(({ name, recordings }) => recordings.map(({ sha256 }) => keyOf(name, sha256))),
+  );
+  return fetches.value.filter(({ station, sha256 }) => !listed.has(keyOf(station, sha256)));
 });
 
 /** How a station's list stands: lost first, then how old what is shown is. */
