@@ -71,11 +71,11 @@ class RecordingDesk:
         await self.refresh()
         return doc
 
-    async def add_fetched(self, path: str, name: str, station: str) -> RecordingDoc:
+    async def add_fetched(self, path: str, name: str, station: str, sha256: str) -> RecordingDoc:
         """Takes in what came from another station, where it can be read. Raises RecordingError when it holds no flight;
         the file is left then."""
         await self._board.run(f"Reading {name}", lambda lane, _: lane.call(review_task.read, Path(path), name))
-        doc = await asyncio.to_thread(self._shelf.add, Path(path), name, station)
+        doc = await asyncio.to_thread(self._shelf.add, Path(path), name, station, sha256)
         await self.refresh()
         return doc
 

@@ -18,7 +18,7 @@ from server.errors import BadRequestError, NotFoundError, reported
 from server.library.library import Library
 from server.library.shelf import iso_utc
 from server.library.terrain_of import FlownOver, terrain_of
-from server.library.whole_files import check_id, storage_errors, sync_directory
+from server.library.whole_files import check_id, storage_errors, sync_directory, write_atomically
 from server.schemas import RecordingDoc
 from server.schemas.station_docs import FIRST_VEHICLE
 from telemetry.stations.station_names import checked_name
@@ -91,13 +91,16 @@ class RecordingShelf:
         """Raises NotFoundError."""
         return self._doc(self.path(recording_id))
 
-    def add(self, upload: Path, name: str, station: str = "") -> RecordingDoc:
+    def add(self, upload: Path, name: str, station: str = "", sha256: str = "") -> RecordingDoc:
         """Takes in a file under its own name, or one near it; it has been read before. ``station``: from which it was
-        fetched."""
+        fetched, with its SHA-256, which is kept beside it."""
         folder = self._library.root / FETCHED / checked_name(station) if station else self._folder
         target = _free_place(folder, name)
         with storage_errors(target):
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if sha256:
+                # First: what is killed then leaves a note of no file, which the next one of that name overwrites.
+                write_atomically(_note_of(target), f"{sha256}  {target.name}\n".encode())
             os.rename(upload, target)
             sync_directory(target.parent)
         return self._doc(target)
@@ -106,6 +109,8 @@ class RecordingShelf:
         path = self.path(recording_id)
         with storage_errors(path):
             path.unlink()
+            if self._station(path):
+                _note_of(path).unlink(missing_ok=True)
             sync_directory(path.parent)
 
     def _files(self) -> list[Path]:
@@ -174,6 +179,20 @@ def plain_name(path: Path) -> str:
     return os.fsencode(path.name).decode("utf-8", "replace")
 
 
+def sha256_of_fetched(path: Path) -> str:
+    """As it was when it came; empty: not known."""
+    try:
+        noted = _note_of(path).read_bytes()[:64].decode("ascii", "replace")
+    except OSError:
+        return ""
+    return noted if len(noted) == 64 else ""
+
+
+def _note_of(path: Path) -> Path:
+    """As sha256sum writes and checks it."""
+    return path.with_name(f".{path.name}.sha256")
+
+
 def suffix_of_recording(name: str) -> str:
     """Raises BadRequestError for a file that is no kind of recording."""
     suffix = PurePosixPath(name).suffix.lower()
@@ -186,7 +205,7 @@ def suffix_of_recording(name: str) -> str:
 
 
 def _free_place(folder: Path, name: str) -> Path:
-    plain = Path(shelf_name(name))
+    plain = Path(_shelf_name(name))
     stem, suffix = plain.stem, plain.suffix
     number = 1
     while (target := folder / f"{stem}{f'-{number}' if number > 1 else ''}{suffix}").exists():
@@ -194,7 +213,7 @@ def _free_place(folder: Path, name: str) -> Path:
     return target
 
 
-def shelf_name(name: str) -> str:
+def _shelf_name(name: str) -> str:
     """Under which it is taken in, unless there is one of that name. Raises BadRequestError."""
     return f"{_plain_stem(name)}{suffix_of_recording(name)}"
 

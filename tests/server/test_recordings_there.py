@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,6 +15,7 @@ import pytest
 from server.errors import BusyError, InUseError, JobCancelledError, NotReadyError, StorageError, WorkerDiedError
 from server.flying.apart import recordings_there
 from server.flying.apart.recordings_there import FRESH_S, RecordingsThere
+from server.flying.recordings import RecordingDesk
 from server.library import Library
 from server.library.recording_list import FETCHED, RecordingShelf
 from server.schemas import RecordingDoc
@@ -61,7 +63,8 @@ class Desk:
     async def shelved(self) -> list[tuple[Path, RecordingDoc]]:
         return self.shelf
 
-    async def add_fetched(self, path: str, name: str, station: str) -> RecordingDoc:
+    async def add_fetched(self, path: str, name: str, station: str, sha256: str) -> RecordingDoc:
+        assert sha256 == IT.sha256
         self.reads += 1
         if self.answers and (error := self.answers.pop(0)) is not None:
             raise error
@@ -232,7 +235,8 @@ def test_one_that_ends_its_worker_is_read_once_kept_and_read_again_by_a_press(
 def test_one_that_was_taken_in_before_the_server_died_is_not_fetched_anew(tmp_path: Path) -> None:
     async def whole() -> None:
         there = There(tmp_path)
-        there.desk.shelf = [(Path("/f/Bravo/flight.mcap"), doc_of("flight.mcap", "Bravo"))]
+        (tmp_path / ".flight.mcap.sha256").write_text(f"{IT.sha256}  flight.mcap")
+        there.desk.shelf = [(tmp_path / "flight.mcap", doc_of("flight.mcap", "Bravo"))]
         await there.it.list_own()
         there.fetched("waiting", have=0)
         await taking(there, lambda: bool(there.asked))
@@ -269,7 +273,7 @@ def test_lists_are_told_when_one_has_changed_and_not_with_every_piece(tmp_path: 
         assert (types.count("station_recordings"), types.count("station_fetches")) == (1, 25)
         assert [message.type for message in there.it.messages()] == ["station_recordings", "station_fetches"]
         # One of the list is here: pages are told which.
-        there.it._here[recordings_there._key("Bravo", IT)] = "id"
+        there.it._here[recordings_there._key(IT)] = "id"
         there.it.on_status(RecordingsStatus(now_s, lists, (fetch,)))
         assert there.told[-1].stations[0].recordings[0].recording_id == "id"
 
@@ -293,3 +297,24 @@ def test_the_shelf_lists_a_fetched_one_with_where_it_came_from_and_deletes_it(tm
     assert len(shelf.docs()) == 2
     shelf.delete(fetched.id)
     assert [doc.id for doc in shelf.docs()] == [own.id]
+
+
+def test_two_of_one_name_from_one_station_are_both_here(tmp_path: Path) -> None:
+    library = Library(tmp_path / "data")
+    shelf = RecordingShelf(library)
+    none: Any = None
+    desk = RecordingDesk(shelf, none, none, Told())
+    there = RecordingsThere(none, none, Told(), desk, lambda: None, is_on=True, kb_s=8)
+    for number in (1, 2):
+        part = write_flight(tmp_path / f"{number}.mcap", seconds=2.0 * number)
+        it = replace(IT, sha256=f"{number:064x}", size_bytes=part.stat().st_size)
+        doc = shelf.add(part, it.name, "Bravo", it.sha256)
+        # As a server that starts finds it.
+        asyncio.run(there.list_own())
+        assert there._recording_doc(it).recording_id == doc.id
+        assert there._recording_doc(replace(it, sha256="f" * 64)).recording_id is None
+    bravo = library.root / FETCHED / "Bravo"
+    assert (bravo / ".flight-2.mcap.sha256").read_text() == f"{2:064x}  flight-2.mcap\n"
+    for fetched in shelf.docs():
+        shelf.delete(fetched.id)
+    assert list(bravo.iterdir()) == []

@@ -11,6 +11,7 @@ import logging
 import time
 from collections.abc import Callable, Coroutine
 from datetime import datetime
+from pathlib import Path
 from typing import Any
 
 from planning.errors import DescribedError
@@ -18,7 +19,7 @@ from server.errors import BusyError, InUseError, NotReadyError, StorageError, er
 from server.flying.recordings import RecordingDesk
 from server.heard.node_states import Nodes
 from server.heard.relay import Relay
-from server.library.recording_list import plain_name, shelf_name
+from server.library.recording_list import plain_name, sha256_of_fetched
 from server.library.sharing.versions import pulled_recordings
 from server.library.shelf import iso_utc
 from server.schemas import (
@@ -75,8 +76,8 @@ class RecordingsThere:
         self._is_on, self._bytes_per_s, self._now_mono_s = is_on, 1000 * kb_s, now_mono_s
         self._status = RecordingsStatus(0.0)
         self._own: tuple[OfferedRecording, ...] = ()
-        self._here: dict[tuple[str, str, int], str] = {}
-        """Ids of those that were fetched, by station, name on the shelf and bytes."""
+        self._here: dict[tuple[str, int], str] = {}
+        """Ids of those that were fetched, by SHA-256 and bytes: names are given twice."""
         self._wrong: dict[str, tuple[RecordingThere, str, str]] = {}
         """By SHA-256: what came and is no recording, from where, and why."""
         self._taking: dict[str, str] = {}
@@ -140,7 +141,7 @@ class RecordingsThere:
         """Raises StationsError, InUseError, NotReadyError, BusError."""
         listed = [it for each in self._status.stations if each.station == station for it in each.recordings]
         there = next((it for it in listed if it.sha256 == sha256), None)
-        if there is not None and _key(station, there) in self._here:
+        if there is not None and _key(there) in self._here:
             raise InUseError(f"{there.name} of {station} was fetched already.", advice="Open it in the list.")
         heard = self._heard().get(station)
         if heard is not None and heard.state == "lost":
@@ -181,7 +182,7 @@ class RecordingsThere:
         """Raises StorageError."""
         shelved = await self._desk.shelved()
         pulled = await asyncio.to_thread(pulled_recordings, self._desk.root) if self._is_on else frozenset[str]()
-        self._here = {(doc.station, doc.name, doc.bytes): doc.id for _, doc in shelved if doc.station}
+        self._here = await asyncio.to_thread(_fetched, shelved)
         self._own = tuple(
             _offered(str(path), doc)
             for path, doc in shelved
@@ -204,8 +205,8 @@ class RecordingsThere:
         it = fetch.it
         try:
             if fetch.state == "whole" and not self._is_here(fetch):
-                doc = await self._desk.add_fetched(fetch.path, it.name, fetch.station)
-                self._here[_key(fetch.station, it)] = doc.id
+                doc = await self._desk.add_fetched(fetch.path, it.name, fetch.station, it.sha256)
+                self._here[_key(it)] = doc.id
         except RecordingError as error:
             self._wrong[it.sha256] = it, fetch.station, f"It came whole, and is no recording: {_words(error)}"
         except (BusyError, StorageError) as error:
@@ -241,7 +242,7 @@ class RecordingsThere:
         )
 
     def _is_here(self, fetch: FetchStatus) -> bool:
-        return _key(fetch.station, fetch.it) in self._here
+        return _key(fetch.it) in self._here
 
     # For pages
 
@@ -273,10 +274,10 @@ class RecordingsThere:
             listed="no" if known is None else known.state,
             age_s=None if as_of_s is None else max(0.0, now_s - as_of_s),
             text="" if known is None else known.text,
-            recordings=[] if known is None else [self._recording_doc(name, it) for it in known.recordings],
+            recordings=[] if known is None else [self._recording_doc(it) for it in known.recordings],
         )
 
-    def _recording_doc(self, station: str, it: RecordingThere) -> RecordingThereDoc:
+    def _recording_doc(self, it: RecordingThere) -> RecordingThereDoc:
         begin_s, end_s = it.begin_utc_s, it.end_utc_s
         return RecordingThereDoc(
             sha256=it.sha256,
@@ -286,7 +287,7 @@ class RecordingsThere:
             duration_s=None if begin_s is None or end_s is None or end_s < begin_s else end_s - begin_s,
             vehicle=it.vehicle,
             plan_name=it.plan,
-            recording_id=self._here.get(_key(station, it)),
+            recording_id=self._here.get(_key(it)),
         )
 
     def _fetch_doc(self, fetch: FetchStatus) -> RecordingFetchDoc:
@@ -319,8 +320,14 @@ class RecordingsThere:
         ]
 
 
-def _key(station: str, it: RecordingThere) -> tuple[str, str, int]:
-    return station, shelf_name(it.name), it.size_bytes
+def _key(it: RecordingThere) -> tuple[str, int]:
+    return it.sha256, it.size_bytes
+
+
+def _fetched(shelved: list[tuple[Path, RecordingDoc]]) -> dict[tuple[str, int], str]:
+    """For threads."""
+    fetched = [(sha256_of_fetched(path), doc) for path, doc in shelved if doc.station]
+    return {(sha256, doc.bytes): doc.id for sha256, doc in fetched if sha256}
 
 
 def _offered(path: str, doc: RecordingDoc) -> OfferedRecording:
