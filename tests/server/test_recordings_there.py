@@ -59,6 +59,7 @@ class Desk:
     def __init__(self, root: Path) -> None:
         self.root, self.shelf, self.answers = root, list[tuple[Path, RecordingDoc]](), list[Any]()
         self.taken, self.reads = list[tuple[str, str, str]](), 0
+        self.goes_on: asyncio.Event | None = None
 
     async def shelved(self) -> list[tuple[Path, RecordingDoc]]:
         return self.shelf
@@ -66,6 +67,8 @@ class Desk:
     async def add_fetched(self, path: str, name: str, station: str, sha256: str) -> RecordingDoc:
         assert sha256 == IT.sha256
         self.reads += 1
+        if self.goes_on is not None:
+            await self.goes_on.wait()
         if self.answers and (error := self.answers.pop(0)) is not None:
             raise error
         self.taken.append((path, name, station))
@@ -256,6 +259,68 @@ def test_pages_are_told_how_far_it_is_and_a_lost_station_gives_none(tmp_path: Pa
         live = There(tmp_path)
         await live.it.fetch("Bravo", IT.sha256)
         assert live.asked == [FetchRecording("Bravo", IT.sha256)]
+
+    play(whole)
+
+
+def test_why_it_is_no_recording_is_not_overwritten_by_a_word_of_before(tmp_path: Path) -> None:
+    async def whole() -> None:
+        there = There(tmp_path)
+        there.desk.answers = [RecordingError("The file is a program."), RecordingError("There is no such recording.")]
+        there.fetched("whole")
+        loop = asyncio.ensure_future(there.it._take_in())
+        for _ in range(50):
+            await asyncio.sleep(0)
+            there.fetched("whole")  # the node says it again meanwhile, as it does every two seconds
+        there.it.on_status(RecordingsStatus(NOW_S))
+        (failed,) = there.it.doc().fetches
+        assert "The file is a program." in failed.text
+        assert (there.desk.reads, there.asked) == (1, [EndFetch(IT.sha256)])
+        # Fetched anew it is read anew.
+        there.desk.answers = []
+        await there.it.fetch("Bravo", IT.sha256)
+        there.fetched("whole")
+        while not there.desk.taken:
+            await asyncio.sleep(0)
+        loop.cancel()
+        with suppress(asyncio.CancelledError):
+            await loop
+
+    play(whole)
+
+
+def test_one_that_is_cancelled_while_it_is_read_fails_nowhere_and_leaves_no_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recordings_there, "AGAIN_S", 1e9)
+
+    async def whole() -> None:
+        for error in (BusyError("Too many jobs wait."), RecordingError("There is no such recording.")):
+            there = There(tmp_path)
+            there.desk.answers, there.desk.goes_on = [error], asyncio.Event()
+            there.fetched("whole")
+            loop = asyncio.ensure_future(there.it._take_in())
+            while not there.desk.reads:
+                await asyncio.sleep(0)
+            await there.it.end(IT.sha256)
+            there.desk.goes_on.set()
+            for _ in range(20):
+                await asyncio.sleep(0)
+                there.fetched("whole")
+            assert (there.desk.reads, there.asked) == (1, [EndFetch(IT.sha256)])
+            there.it.on_status(RecordingsStatus(NOW_S))
+            assert there.it.doc().fetches == []
+            loop.cancel()
+            with suppress(asyncio.CancelledError):
+                await loop
+        # What was tried again says nothing of that once it was cancelled and is fetched anew.
+        there = There(tmp_path)
+        there.desk.answers = [BusyError("Too many jobs wait.")]
+        there.fetched("whole")
+        await taking(there, lambda: bool(there.it._taking))
+        await there.it.end(IT.sha256)
+        there.fetched("fetching", 12)
+        assert [fetch.text for fetch in there.it.doc().fetches] == [""]
 
     play(whole)
 

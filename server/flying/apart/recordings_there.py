@@ -14,7 +14,6 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from planning.errors import DescribedError
 from server.errors import BusyError, InUseError, NotReadyError, StorageError, error_doc, reported
 from server.flying.recordings import RecordingDesk
 from server.heard.node_states import Nodes
@@ -82,6 +81,9 @@ class RecordingsThere:
         """By SHA-256: what came and is no recording, from where, and why."""
         self._taking: dict[str, str] = {}
         """By SHA-256: why it is tried to be opened again."""
+        self._dealt: dict[str, bool] = {}
+        """By SHA-256: what was read, is no recording, or was cancelled, until its node tells of it no more; whether
+        that was asked to put it away. A word of before is not taken for another one to read."""
         self._unread: dict[str, str] = {}
         """By SHA-256: what came whole and could not be opened, and why; it is kept until somebody presses *Again*."""
         self._told_lists: object = None
@@ -97,6 +99,10 @@ class RecordingsThere:
     def on_status(self, status: RecordingsStatus) -> None:
         """Lists are long: pages are told of them when one has changed, and how far a fetch is every two seconds."""
         self._status = status
+        told = {fetch.it.sha256 for fetch in status.fetches}
+        for known in (self._taking, self._dealt, self._unread):
+            for sha256 in known.keys() - told:
+                del known[sha256]
         heard = [(name, station.state) for name, station in self._heard().items()]
         lists = status.stations, heard, self._here.copy()
         if lists != self._told_lists:
@@ -151,13 +157,21 @@ class RecordingsThere:
             self._came.set()
             self._tell_fetches()
             return
+        self._taking.pop(sha256, None)
+        self._dealt.pop(sha256, None)
         await self._nodes.ask_stations(FetchRecording(station, sha256))
 
     async def end(self, sha256: str) -> None:
         """Cancels it, or puts away what it came to. Raises StationsError, BusError."""
         self._wrong.pop(sha256, None)
         self._unread.pop(sha256, None)
-        await self._nodes.ask_stations(EndFetch(sha256))
+        self._taking.pop(sha256, None)
+        self._dealt[sha256] = True
+        try:
+            await self._nodes.ask_stations(EndFetch(sha256))
+        except Exception:
+            self._dealt.pop(sha256, None)
+            raise
         self._tell_fetches()
 
     # Own ones
@@ -202,37 +216,53 @@ class RecordingsThere:
 
     async def _take(self, fetch: FetchStatus) -> bool:
         """False: it is to be tried again."""
+        sha256 = fetch.it.sha256
+        if sha256 not in self._dealt:
+            is_tried_again = await self._read(fetch)
+            if self._dealt.get(sha256) or sha256 in self._unread:
+                return True
+            if is_tried_again:
+                return False
+            self._dealt[sha256] = False
+        try:
+            await self._nodes.ask_stations(EndFetch(sha256))
+        except Exception as error:
+            log.warning("Putting away what was fetched: %s", reported(error, log, "Putting away what was fetched").what)
+            return False
+        self._dealt[sha256] = True
+        return True
+
+    async def _read(self, fetch: FetchStatus) -> bool:
+        """True: it is to be tried again."""
         it = fetch.it
         try:
             if fetch.state == "whole" and not self._is_here(fetch):
                 doc = await self._desk.add_fetched(fetch.path, it.name, fetch.station, it.sha256)
                 self._here[_key(it)] = doc.id
-        except RecordingError as error:
-            self._wrong[it.sha256] = it, fetch.station, f"It came whole, and is no recording: {_words(error)}"
-        except (BusyError, StorageError) as error:
-            self._taking[it.sha256] = f"It has come, and is tried to be opened again: {_words(error)}"
-            log.warning("Taking in %s of %s: %s", it.name, fetch.station, error.what)
-            self._tell_fetches()
-            return False
         except Exception as error:
-            # It may be the file: read again by itself it would end a worker every ten seconds.
-            doing = f"Taking in {it.name} of {fetch.station}"
-            log.warning("%s: %s", doing, reported(error, log, doing).what)
-            self._unread[it.sha256] = f"It came whole, and could not be opened: {_words(error)} It is kept."
-            self._taking.pop(it.sha256, None)
-            self._tell_fetches()
-            return True
+            if not self._dealt.get(it.sha256):  # else it was cancelled meanwhile: its file is gone
+                return self._on_unread(fetch, error)
         self._taking.pop(it.sha256, None)
-        try:
-            await self._nodes.ask_stations(EndFetch(it.sha256))
-        except DescribedError as error:
-            log.warning("Putting away what was fetched: %s", error.what)
+        return False
+
+    def _on_unread(self, fetch: FetchStatus, error: Exception) -> bool:
+        it = fetch.it
+        self._taking.pop(it.sha256, None)
+        doing = f"Taking in {it.name} of {fetch.station}"
+        if isinstance(error, RecordingError):
+            self._wrong[it.sha256] = it, fetch.station, f"It came whole, and is no recording: {_words(error)}"
             return False
-        return True
+        log.warning("%s: %s", doing, reported(error, log, doing).what)
+        if is_tried_again := isinstance(error, (BusyError, StorageError)):
+            self._taking[it.sha256] = f"It has come, and is tried to be opened again: {_words(error)}"
+        else:  # It may be the file: read again by itself it would end a worker every ten seconds.
+            self._unread[it.sha256] = f"It came whole, and could not be opened: {_words(error)} It is kept."
+        self._tell_fetches()
+        return is_tried_again
 
     def _is_done(self, fetch: FetchStatus) -> bool:
         """It came whole; or it came before, and the node was not told in time that it was taken in."""
-        if fetch.it.sha256 in self._unread:
+        if fetch.it.sha256 in self._unread or self._dealt.get(fetch.it.sha256):
             return False
         return fetch.state == "whole" or (fetch.have_bytes == 0 and self._is_here(fetch))
 
