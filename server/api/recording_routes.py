@@ -11,6 +11,7 @@ from pydantic import RootModel
 from server.api.access import DONE, ERROR_RESPONSES, All, Fly, InCharge, answer, parts_of
 from server.api.terrain_routes import RAW_BODY, FileName
 from server.door.uploads import display_name, stream_to_disk, suffix_of
+from server.flying.apart.recordings_there import FRESH_S, PRESSED_S
 from server.library.recording_list import suffix_of_recording
 from server.schemas import (
     BagDoc,
@@ -26,6 +27,7 @@ router = APIRouter(prefix="/api", tags=["recordings"], responses=ERROR_RESPONSES
 
 
 StationName = Annotated[str, Path(max_length=24)]
+Fresh = Annotated[float, Query(ge=PRESSED_S, le=3600.0)]
 Sha256 = Annotated[str, Path(pattern="^[0-9a-f]{64}$")]
 
 
@@ -77,11 +79,11 @@ async def delete(recording_id: str, fleet: All) -> None:
 
 
 @router.get("/stations/recordings", response_model=RecordingsThereDoc)
-async def recordings_there(fleet: All, ask: bool = False) -> Response:
+async def recordings_there(fleet: All, ask: bool = False, fresh_s: Fresh = FRESH_S) -> Response:
     """Of other stations, as far as they are listed. ``ask``: has those that are heard asked for lists that are older
-    than 30 s; the stream says when these have come. 409 where no others are met."""
+    than ``fresh_s``; the stream says when these have come. 409 where no others are met."""
     if ask:
-        await fleet.recordings_there.look()
+        await fleet.recordings_there.look(fresh_s)
     return answer(fleet.recordings_there.doc())
 
 

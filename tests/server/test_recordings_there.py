@@ -14,7 +14,7 @@ import pytest
 
 from server.errors import BusyError, InUseError, JobCancelledError, NotReadyError, StorageError, WorkerDiedError
 from server.flying.apart import recordings_there
-from server.flying.apart.recordings_there import FRESH_S, RecordingsThere
+from server.flying.apart.recordings_there import FRESH_S, PRESSED_S, RecordingsThere
 from server.flying.recordings import RecordingDesk
 from server.library import Library
 from server.library.recording_list import FETCHED, RecordingShelf
@@ -124,6 +124,13 @@ def test_a_look_asks_stations_that_are_heard_unless_their_list_is_fresh(tmp_path
         there.listed(age_s=FRESH_S + 1)
         await there.it.look()
         assert there.asked == [ListRecordings("Bravo")] * 2
+        # Whoever asks by a press does not wait for that.
+        there.listed(age_s=PRESSED_S - 1)
+        await there.it.look(PRESSED_S)
+        assert len(there.asked) == 2
+        there.listed(age_s=PRESSED_S + 1)
+        await there.it.look(PRESSED_S)
+        assert len(there.asked) == 3
         lost = There(tmp_path, state="lost")
         await lost.it.look()
         assert lost.asked == []

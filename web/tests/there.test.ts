@@ -110,10 +110,12 @@ describe("recordings of other stations", () => {
     );
     await askThere();
     expect(there.value).toEqual([bravo]);
+    await askThere({ pressed: true });
     await fetchThere("Bravo", SHA);
     await endFetch(fetching);
     expect(asked.mock.calls.map(([path, init]) => [init?.method, path])).toEqual([
       ["GET", "/api/stations/recordings?ask=true"],
+      ["GET", "/api/stations/recordings?ask=true&fresh_s=3"],
       ["POST", `/api/stations/Bravo/recordings/${SHA}`],
       ["DELETE", `/api/stations/Bravo/recordings/${SHA}`],
     ]);

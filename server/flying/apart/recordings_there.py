@@ -51,8 +51,8 @@ from telemetry.topics.station_vehicles import OtherStation, StationsStatus
 log = logging.getLogger("hedgehop.flying")
 
 TELL_EVERY_S, LIST_EVERY_S, AGAIN_S, TELL_FETCH_S = 1.0, 5.0, 10.0, 2.0
-FRESH_S = 30.0
-"""Whoever looks has a list asked for anew that is older."""
+FRESH_S, PRESSED_S = 30.0, 3.0
+"""Whoever looks has a list asked for anew that is older; whoever asks by a press, one that is older than the second."""
 
 
 class RecordingsThere:
@@ -132,13 +132,13 @@ class RecordingsThere:
         """What a page is told first."""
         return [self._lists_message(), StationFetchesMessage(fetches=self._fetch_docs())]
 
-    async def look(self) -> None:
-        """Has each station that is heard asked for its list, unless it is fresh or under way. Raises BusError."""
+    async def look(self, fresh_s: float = FRESH_S) -> None:
+        """Has each station that is heard asked for its list, unless it is younger or under way. Raises BusError."""
         now_s, lists = self._now_mono_s(), {each.station: each for each in self._status.stations}
         for name, station in self._heard().items():
             known = lists.get(name)
             is_fresh = known is not None and (
-                known.state == "asking" or (known.as_of_t_mono_s is not None and now_s - known.as_of_t_mono_s < FRESH_S)
+                known.state == "asking" or (known.as_of_t_mono_s is not None and now_s - known.as_of_t_mono_s < fresh_s)
             )
             if station.state == "live" and not is_fresh:
                 await self._nodes.ask_stations(ListRecordings(name))

@@ -138,7 +138,7 @@ export function There() {
           <Fetch fetch={fetch} />
         </div>
       ))}
-      <Button kind="quiet" icon="undo" testid="there-ask" onClick={() => void askThere()}>
+      <Button kind="quiet" icon="undo" testid="there-ask" onClick={() => void askThere({ pressed: true })}>
         Ask again
       </Button>
     </Section>

@@ -36,11 +36,14 @@ export const forgetFetches = () => {
 const pathOf = (station: string, sha256: string) =>
   `/api/stations/${encodeURIComponent(station)}/recordings/${sha256}`;
 
-/** Has the stations that are heard asked for their lists; those that are fresh are left. */
-export async function askThere(): Promise<void> {
+/** Has the stations that are heard asked for their lists; those that are fresh are left: 30 s, after a press 3. */
+export async function askThere({ pressed = false } = {}): Promise<void> {
   try {
     takeThere(
-      await requestJson<RecordingsThereDoc>("GET", "/api/stations/recordings?ask=true"),
+      await requestJson<RecordingsThereDoc>(
+        "GET",
+        `/api/stations/recordings?ask=true${pressed ? "&fresh_s=3" : ""}`,
+      ),
       performance.now(),
     );
     setError(THERE, null);
