@@ -73,10 +73,12 @@ describe("recordings of other stations", () => {
   test("how a list stands: lost first, then how old it is by now", () => {
     now_ms.value = 10_000;
     takeThere(doc(), 10_000);
-    expect(listWords(bravo)).toBe("as of 0:20 ago");
+    expect(listWords(bravo)).toBe("20 s ago");
+    expect(listWords({ ...bravo, age_s: 0 })).toBe("just now");
     now_ms.value = 40_000;
-    expect(listWords(bravo)).toBe("as of 0:50 ago");
-    expect(listWords({ ...bravo, state: "lost" })).toBe("lost · as of 0:50 ago");
+    expect(listWords(bravo)).toBe("50 s ago");
+    expect(listWords({ ...bravo, age_s: 270 })).toBe("5 min ago");
+    expect(listWords({ ...bravo, state: "lost" })).toBe("lost · 50 s ago");
     expect(listWords({ ...bravo, state: "lost", listed: "asking", age_s: null })).toBe("lost");
     expect(listWords({ ...bravo, listed: "no", age_s: null })).toBe("not asked yet");
     expect(listWords({ ...bravo, listed: "silent", age_s: null })).toBe("no answer");

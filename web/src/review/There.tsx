@@ -98,7 +98,7 @@ function Station({ station }: { station: StationRecordingsDoc }) {
   return (
     <div class="there-station" data-testid={`there-${station.name}`}>
       <h3 class={station.state === "lost" ? "old" : ""}>
-        {station.name} <span class="muted">{listWords(station)}</span>
+        {station.name} <span class="muted">· {listWords(station)}</span>
       </h3>
       {station.text && <p class="hint">{station.text}</p>}
       {station.recordings.length > 0 ? (
@@ -133,7 +133,7 @@ export function There() {
       {unlisted.value.map((fetch) => (
         <div key={fetch.sha256} class="there-station">
           <h3>
-            {fetch.station} <span class="muted">{fetch.name}</span>
+            {fetch.station} <span class="muted">· {fetch.name}</span>
           </h3>
           <Fetch fetch={fetch} />
         </div>

@@ -1,5 +1,5 @@
 import { computed, signal } from "@preact/signals";
-import { bytes, duration, number } from "../format";
+import { age, bytes, duration, number } from "../format";
 import type { RecordingFetchDoc, RecordingsThereDoc, StationRecordingsDoc } from "../messages";
 import { asErrorDoc, isCancelled, requestJson } from "../net/api";
 import { now_ms } from "./clock";
@@ -74,12 +74,12 @@ export const unlisted = computed(() => {
 
 /** How a station's list stands: lost first, then how old what is shown is. */
 export function listWords({ state, listed, age_s }: StationRecordingsDoc): string {
-  const by_now_s = age_s === null ? null : age_s + Math.max(0, now_ms.value - received_ms) / 1000;
-  const age = by_now_s === null ? "" : `as of ${duration(by_now_s)} ago`;
+  const by_now = age_s === null ? "" : age(1000 * age_s + Math.max(0, now_ms.value - received_ms));
+  const old = by_now === "now" ? "just now" : by_now && `${by_now} ago`;
   const how = { no: "not asked yet", asking: "being asked…", listed: "", silent: "no answer", off: "" }[
     listed
   ];
-  return [state === "lost" ? "lost" : "", state === "lost" && listed === "asking" ? "" : how, age]
+  return [state === "lost" ? "lost" : "", state === "lost" && listed === "asking" ? "" : how, old]
     .filter(Boolean)
     .join(" · ");
 }
