@@ -337,16 +337,17 @@ def test_lists_are_told_when_one_has_changed_and_not_with_every_piece(tmp_path: 
         there, now_s = There(tmp_path), NOW_S
         there.it._now_mono_s = lambda: now_s
         lists = (StationRecordings("Bravo", "listed", NOW_S, "", (IT,)),)
+        status = RecordingsStatus(now_s, lists)
         for have in range(100):
             now_s = NOW_S + 0.5 * have
-            fetch = FetchStatus("Bravo", IT, "fetching", have, 100.0 + have)
-            there.it.on_status(RecordingsStatus(now_s, lists, (fetch,)))
+            status = replace(status, fetches=(FetchStatus("Bravo", IT, "fetching", have, 100.0 + have),))
+            there.it.on_status(status)
         types = [message.type for message in there.told]
         assert (types.count("station_recordings"), types.count("station_fetches")) == (1, 25)
         assert [message.type for message in there.it.messages()] == ["station_recordings", "station_fetches"]
         # One of the list is here: pages are told which.
         there.it._here[recordings_there._key(IT)] = "id"
-        there.it.on_status(RecordingsStatus(now_s, lists, (fetch,)))
+        there.it.on_status(status)
         assert there.told[-1].stations[0].recordings[0].recording_id == "id"
 
     play(whole)
