@@ -183,7 +183,7 @@ def test_the_page_leaves_when_its_session_ends(demo: Page) -> None:
     other = demo.context.new_page()
     other.goto(demo.url)
     expect(other.get_by_test_id("poi-row")).to_have_count(6)
-    # Nothing of it is on its way when it leaves, no font either, which would be refused: Chromium has been seen never to
+    # Nothing of it is on its way when it leaves, no font either (it would be refused): Chromium has been seen never to
     # answer to the close of such a page.
     expect(other.frame_locator("[data-testid=view-frame]").locator("title")).to_be_attached()
     other.get_by_test_id("help").click()
