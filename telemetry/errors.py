@@ -71,6 +71,10 @@ class RecordingError(TelemetryError):
     code = "recording"
 
 
+class RecordingUnreadableError(RecordingError):
+    """Its disk does not give it: what it holds is not known."""
+
+
 class RecordingFullError(RecordingError):
     code = "recording_full"
 

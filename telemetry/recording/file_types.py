@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from telemetry.errors import RecordingError
+from telemetry.errors import RecordingError, RecordingUnreadableError
 from telemetry.recording.tlog import Data
 
 MCAP_MAGIC = b"\x89MCAP0\r\n"
@@ -31,7 +31,7 @@ _ADVICE = "Choose a recording (.mcap), a ground station's log (.tlog) or a vehic
 def opened(path: Path) -> Iterator[Data]:
     """The file's content without reading it all at once.
 
-    Raises RecordingError for what is missing, no file, unreadable or empty.
+    Raises RecordingError for what is missing, no file or empty; RecordingUnreadableError.
     """
     try:
         if not path.is_file():
@@ -42,7 +42,7 @@ def opened(path: Path) -> Iterator[Data]:
             data = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     except OSError as error:
         what = f"The file cannot be read: {error.strerror or error}."
-        raise RecordingError(what, where=path.name, advice="Check its permissions and its disk.") from error
+        raise RecordingUnreadableError(what, where=path.name, advice="Check its permissions and its disk.") from error
     with data:
         yield data
 

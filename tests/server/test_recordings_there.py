@@ -19,7 +19,7 @@ from server.flying.recordings import RecordingDesk
 from server.library import Library
 from server.library.recording_list import FETCHED, RecordingShelf
 from server.schemas import RecordingDoc
-from telemetry.errors import RecordingError
+from telemetry.errors import RecordingError, RecordingUnreadableError
 from telemetry.topics.station_recordings import (
     EndFetch,
     FetchRecording,
@@ -211,6 +211,7 @@ def test_one_that_cannot_be_opened_now_is_kept_and_tried_again(tmp_path: Path, m
     [
         (WorkerDiedError("The process that did the work ended."), "The process that did the work ended."),
         (JobCancelledError("The job was cancelled."), "The job was cancelled."),
+        (RecordingUnreadableError("The file cannot be read: I/O."), "The file cannot be read: I/O."),
         (RuntimeError("a bug"), "Something in Hedgehop itself went wrong."),
     ],
 )

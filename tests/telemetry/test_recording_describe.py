@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import errno
+import mmap
+import os
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
+from telemetry.errors import RecordingUnreadableError
 from telemetry.recording.describe import describe_recording
+from telemetry.recording.flight_log import read_flight_log
 from tests.telemetry.recordings import T0_UTC_S, write_flight
 
 
@@ -47,4 +53,21 @@ def test_a_hundred_are_listed_without_being_read(tmp_path: Path) -> None:
     data = bytearray(path.read_bytes())
     data[len(data) // 4 : len(data) // 2] = bytes(len(data) // 2 - len(data) // 4)
     path.write_bytes(data)
+    assert describe_recording(path).fault is None
+
+
+def test_what_its_disk_does_not_give_is_not_called_no_recording(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "flight.mcap"
+    write_flight(path)
+
+    def fails(*_args: object, **_named: object) -> NoReturn:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(mmap, "mmap", fails)
+        with pytest.raises(RecordingUnreadableError, match="cannot be read: Input/output error"):
+            read_flight_log(path)
+        assert describe_recording(path).fault == "The file cannot be read: Input/output error."
     assert describe_recording(path).fault is None

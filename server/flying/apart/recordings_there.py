@@ -33,7 +33,7 @@ from server.schemas import (
     StationRecordingsMessage,
 )
 from telemetry.bus.bus import Bus
-from telemetry.errors import RecordingError
+from telemetry.errors import RecordingError, RecordingUnreadableError
 from telemetry.topics.messages import Topic
 from telemetry.topics.station_recordings import (
     EndFetch,
@@ -249,13 +249,13 @@ class RecordingsThere:
         it = fetch.it
         self._taking.pop(it.sha256, None)
         doing = f"Taking in {it.name} of {fetch.station}"
-        if isinstance(error, RecordingError):
+        if isinstance(error, RecordingError) and not isinstance(error, RecordingUnreadableError):
             self._wrong[it.sha256] = it, fetch.station, f"It came whole, and is no recording: {_words(error)}"
             return False
         log.warning("%s: %s", doing, reported(error, log, doing).what)
         if is_tried_again := isinstance(error, (BusyError, StorageError)):
             self._taking[it.sha256] = f"It has come, and is tried to be opened again: {_words(error)}"
-        else:  # It may be the file: read again by itself it would end a worker every ten seconds.
+        else:  # It may be the disk, or the file: read again by itself it would end a worker every ten seconds.
             self._unread[it.sha256] = f"It came whole, and could not be opened: {_words(error)} It is kept."
         self._tell_fetches()
         return is_tried_again
