@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import sys
 import threading
 import time
@@ -62,6 +63,7 @@ class LoopLag:
         watch = threading.Thread(
             target=self._watch, args=(threading.get_ident(), ended), name="watches the loop", daemon=True
         )
+        self._due_s = math.inf  # what its start takes is not the loop's
         watch.start()
         self._due_s, self._work_s = self._now_s() + TICK_S, self._worked_s()
         try:
