@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import sys
+import time
 from collections.abc import Coroutine, Sequence
 from typing import Any
 
@@ -11,7 +12,7 @@ from server.door.alarms import Alarms
 from server.door.hub import Hub
 from server.errors import BadRequestError, NotFoundError, NotReadyError
 from server.flying.apart.airspace import Airspace
-from server.flying.apart.nearness import Nearness
+from server.flying.apart.nearness import Flown, Nearness, in_the_air
 from server.flying.apart.other_stations import Meeting, OtherStations
 from server.flying.apart.other_vehicles import OtherVehicles
 from server.flying.apart.own_lines import OwnLines
@@ -163,6 +164,12 @@ class Fleet:
         if not (number.isascii() and number.isdecimal() and len(number) < 4):
             raise BadRequestError(f"Hedgehop-Vehicle is {number[:20]!r}, which is no number of a vehicle.")
         return self.of(int(number))
+
+    def others_in_air(self, number: int) -> list[Flown]:
+        """All but that one: the station's own, and other stations'."""
+        own = in_the_air({flying.number: (flying.name, flying.live) for flying in self.flights})
+        elsewhere = [] if self._stations is None else self._stations.flown(time.monotonic())
+        return [*(flown for key, flown in own.items() if key != number), *elsewhere]
 
     @property
     def recordings_there(self) -> RecordingsThere:

@@ -122,7 +122,8 @@ class GuidedWay:
     rises_m: float
     """So far it first climbs straight up, out of where it is nearer than it must be; 0 where it is not."""
     length_m: float
-    seconds: float
+    t_s: F64
+    """(K,) predicted seconds until it is there, from the first place on; never falling."""
     problem: Problem | None
     """None: it may be flown."""
     turns: int = 0
@@ -132,6 +133,10 @@ class GuidedWay:
     def clearance_m(self) -> float:
         """Smallest distance to the surface, the ground at home at its worse end."""
         return self.certificate.kept_m
+
+    @property
+    def seconds(self) -> float:
+        return float(self.t_s[-1])
 
     @property
     def reasons(self) -> tuple[str, ...]:

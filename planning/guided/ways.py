@@ -279,7 +279,7 @@ def _way(asked: _Asked, points_m: F64, certificate: Certificate, problem: Proble
         raised_m=max(0.0, float(points_m[-1, 2] - asked_m)),
         rises_m=max(0.0, float(points_m[0, 2] - at_m[2])),
         length_m=float(np.linalg.norm(legs, axis=1).sum()),
-        seconds=float(np.maximum(flat_m / demand.speed_m_s, np.abs(up_m) / rates_m_s).sum()),
+        t_s=np.concatenate([[0.0], np.cumsum(np.maximum(flat_m / demand.speed_m_s, np.abs(up_m) / rates_m_s))]),
         problem=problem,
     )
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from fastapi import APIRouter
 from fastapi.responses import Response
 
-from server.api.access import DONE, ERROR_RESPONSES, Fly, InCharge, answer
+from server.api.access import DONE, ERROR_RESPONSES, All, Fly, InCharge, answer
 from server.schemas import (
     FenceHeightsDoc,
     FenceHeightsSet,
@@ -82,15 +82,15 @@ async def resume(operator: InCharge, flying: Fly, body: ResumeFlight | None = No
 
 
 @router.put("/way", response_model=GuidedState)
-async def judge_way(body: WayBody, operator: InCharge, flying: Fly) -> Response:
+async def judge_way(body: WayBody, operator: InCharge, flying: Fly, fleet: All) -> Response:
     """Lays a guided way from where the vehicle is over the open surface model and judges it; nothing moves."""
-    return answer(await flying.ways.judge(operator, body))
+    return answer(await flying.ways.judge(operator, body, lambda: fleet.others_in_air(flying.number)))
 
 
 @router.post("/way/fly", **DONE)
-async def fly_way(body: FlyWayBody, operator: InCharge, flying: Fly) -> None:
+async def fly_way(body: FlyWayBody, operator: InCharge, flying: Fly, fleet: All) -> None:
     """Flies the way that was judged last; 409 where it may not be flown, 404 for one that is out of date."""
-    await flying.ways.fly(operator, body)
+    await flying.ways.fly(operator, body, lambda: fleet.others_in_air(flying.number))
 
 
 @router.put("/way/speed", **DONE)

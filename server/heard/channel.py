@@ -8,7 +8,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from server.heard.flown_track import Track
-from server.heard.plan_follower import Follower
+from server.heard.led_way import LedWay
+from server.heard.plan_follower import Ahead, Follower
 from server.schemas import (
     FlightMessage,
     FollowDoc,
@@ -70,6 +71,8 @@ class Channel:
         self.flight = FlightStatus()
         self.follow: FollowDoc | None = None
         self.way: ShownWay | None = None
+        self.led: LedWay | None = None
+        """The way that is flown, where it is a single guided one."""
 
     @property
     def armed(self) -> bool:
@@ -78,6 +81,19 @@ class Channel:
     @property
     def in_air(self) -> bool:
         return self.state is not None and self.state.armed and self.state.landed != "on_ground"
+
+    @property
+    def is_led_apart(self) -> bool:
+        """It is flown in GUIDED, and not along its plan."""
+        return self.flight.way == "guided" and self.flight.target is None
+
+    def ahead(self) -> Ahead | None:
+        """What is left of the plan or of the single way that is flown; None where nothing tells it."""
+        if not self.is_led_apart:
+            return self.follower.ahead(self.flight)
+        if self.led is None or self.state is None or self.flight.phase != "flying":
+            return None
+        return self.led.ahead(self.state)
 
     @property
     def battery(self) -> str:

@@ -50,8 +50,9 @@ class WayDoc(Strict):
 
     id: str
     action: WayAction
-    problem: Problem | None
-    """null: certified. "return": the way itself is clear, the vehicle's own return from it would not be."""
+    problem: Problem | Literal["others"] | None
+    """null: certified. "return": the way itself is clear, the vehicle's own return from it would not be. "others": it
+    is clear, and would lead near another vehicle of the station's in the air."""
     flies: bool = False
     """It is being flown."""
     notes: list[str]

@@ -10,12 +10,13 @@ from types import SimpleNamespace
 from typing import Any
 
 from mapping.geometry.frames import moved_deg
+from server.flying.apart.nearness import Flown
 from server.flying.in_flight import home_desk
 from server.flying.in_flight.home_desk import HomeDesk
 from server.flying.in_flight.way_desk import WayDesk
 from server.heard.channel import Channel
 from server.obstacles.obstacle_watch import Watch
-from server.schemas import GuidedState, HomeAskedDoc, HomeBody, HomeState, PlaceDoc, WayBody, WayDoc
+from server.schemas import FlyWayBody, GuidedState, HomeAskedDoc, HomeBody, HomeState, PlaceDoc, WayBody, WayDoc
 from server.work.jobs import Lane
 from telemetry.flight.home_watch import home_of
 from telemetry.topics.messages import Topic, VehicleText
@@ -95,6 +96,7 @@ class WayBench:
     def __init__(self, made: Made, lane: Lane, *, up_m: float = 30.0) -> None:
         self.made, self.vehicle, self.document = made, Vehicle(), made.document
         self.told: list[GuidedState] = []
+        self.others: list[Flown] = []
         me: Any = self
         self.live = Channel("live", Told())
         self.hovers(made.standing(), up_m)
@@ -110,6 +112,9 @@ class WayBench:
         self.live.state = replace(standing, position_t_mono_s=now_s, gnss_t_mono_s=now_s, **flies)
         self.live.track.states = [standing, self.live.state]
 
+    async def fly(self, body: FlyWayBody) -> None:
+        await self.desk.fly(ME, body, lambda: self.others)
+
     def beside(self, east_m: float, north_m: float) -> PlaceDoc:
         there = self.made.standing(east_m=east_m, north_m=north_m)
         assert there.lat_deg is not None
@@ -117,6 +122,6 @@ class WayBench:
         return PlaceDoc(lat_deg=there.lat_deg, lon_deg=there.lon_deg)
 
     async def judged(self, **body: Any) -> WayDoc:
-        way = (await self.desk.judge(ME, WayBody.model_validate(body))).way
+        way = (await self.desk.judge(ME, WayBody.model_validate(body), lambda: self.others)).way
         assert way is not None
         return way

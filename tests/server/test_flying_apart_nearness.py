@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -82,9 +81,6 @@ class Pair:
 
 
 class _Channel:
-    flight = None
-    follower = SimpleNamespace(ahead=lambda flight: None)
-
     def __init__(self, pair: Pair, number: int) -> None:
         self._pair, self._number = pair, number
 
@@ -95,6 +91,9 @@ class _Channel:
     @property
     def in_air(self) -> bool:
         return self._pair.in_air
+
+    def ahead(self) -> None:
+        return None
 
 
 def test_both_have_the_alarm_until_they_are_well_apart() -> None:

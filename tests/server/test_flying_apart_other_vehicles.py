@@ -217,3 +217,22 @@ def _home_at(plan: Whole, rtl_m: float) -> np.ndarray:
     heights_m = plan.alt_rel_home_m.copy()
     heights_m[-3:-1] = rtl_m
     return heights_m
+
+
+def test_who_stands_on_its_way_is_in_it_until_he_is_led_away() -> None:
+    lat_deg, lon_deg = moved_deg(HOME, 300, 0)
+    state = replace(flying(ACROSS, 20.0).flown.state, lat_deg=lat_deg, lon_deg=lon_deg)
+    hovers = Other(Flown("Bee", state, None), flies=True, on_board=None)
+    row = told(standing(EAST), hovers)
+    assert row.state == "bad"
+    assert row.text.startswith("Started now, it may come within 0 m of Bee in ")
+    assert row.mend == "Start later, or land Bee first."
+    higher = replace(hovers, flown=replace(hovers.flown, state=replace(state, alt_amsl_m=HOME_ALT_M + 45.0)))
+    assert told(standing(EAST), higher).state == "accept"
+
+    def led(north_m: float) -> Other:
+        away = Ahead(np.array([moved_deg(HOME, 300, north_m)]), np.array([20.0]), np.array([abs(north_m) / SPEED_M_S]))
+        return replace(hovers, flown=replace(hovers.flown, ahead=away))
+
+    assert told(standing(EAST), led(100.0)).state == "accept"
+    assert told(standing(EAST), led(3.0)).state == "bad"

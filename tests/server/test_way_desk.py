@@ -15,6 +15,7 @@ from planning.errors import ParameterError
 from planning.fence.fence_model import Fence, circle
 from planning.formats.fence_items import fence_items
 from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotFoundError, NotReadyError
+from server.flying.apart.nearness import Flown
 from server.flying.in_flight.way_desk import flown_places
 from server.flying.in_flight.way_task import WayJudged, wish_of
 from server.heard.channel import ShownWay
@@ -48,7 +49,7 @@ def test_a_way_is_judged_shown_and_flown_from_where_the_vehicle_hovers(
         assert shown.is_certified
 
         with pytest.raises(NotFoundError, match="Nothing is judged any more"):
-            await bench.desk.fly(ME, FlyWayBody(id="another"))
+            await bench.fly(FlyWayBody(id="another"))
         vehicle: Any = bench.vehicle
         call = vehicle.call
 
@@ -57,7 +58,7 @@ def test_a_way_is_judged_shown_and_flown_from_where_the_vehicle_hovers(
             return await call(request)
 
         vehicle.call = call_while_it_is_put_away
-        await bench.desk.fly(ME, FlyWayBody(id=way.id))
+        await bench.fly(FlyWayBody(id=way.id))
         vehicle.call = call
         request = bench.vehicle.told[-1]
         assert isinstance(request, FlyWay)
@@ -100,7 +101,7 @@ def test_what_is_not_certified_is_shown_and_not_flown(made: Made, lane: Lane, ru
         assert not bench.live.way.is_certified
         for accepts in (False, True):
             with pytest.raises(NotCertifiedError, match="fence"):
-                await bench.desk.fly(ME, FlyWayBody(id=way.id, accept_return=accepts))
+                await bench.fly(FlyWayBody(id=way.id, accept_return=accepts))
 
     runner.run(scenario())
 
@@ -133,9 +134,9 @@ def test_where_only_the_return_is_not_clear_it_is_flown_once_that_is_accepted(
         bench = WayBench(made, stand_in)
         way = await bench.judged(action="height", height_m=20.0)
         with pytest.raises(NotCertifiedError):
-            await bench.desk.fly(ME, FlyWayBody(id=way.id))
+            await bench.fly(FlyWayBody(id=way.id))
         assert bench.vehicle.told == []
-        await bench.desk.fly(ME, FlyWayBody(id=way.id, accept_return=True))
+        await bench.fly(FlyWayBody(id=way.id, accept_return=True))
         assert isinstance(bench.vehicle.told[-1], FlyWay)
 
     runner.run(scenario())
@@ -150,7 +151,7 @@ def test_a_way_that_was_judged_long_ago_is_asked_for_again(
         late_s = time.monotonic() + CHECK_FRESH_S + 1.0
         monkeypatch.setattr("server.flying.in_flight.way_desk.time.monotonic", lambda: late_s)
         with pytest.raises(CheckNeededError, match="120 s ago"):
-            await bench.desk.fly(ME, FlyWayBody(id=way.id))
+            await bench.fly(FlyWayBody(id=way.id))
         assert bench.vehicle.told == []
         monkeypatch.undo()
 
@@ -164,7 +165,7 @@ def test_a_way_that_was_judged_before_home_moved_is_not_flown(made: Made, lane: 
         assert bench.live.state is not None
         bench.live.state = replace(bench.live.state, home_alt_amsl_m=(bench.live.state.home_alt_amsl_m or 0.0) - 0.8)
         with pytest.raises(CheckNeededError, match="Home was moved"):
-            await bench.desk.fly(ME, FlyWayBody(id=way.id))
+            await bench.fly(FlyWayBody(id=way.id))
         assert bench.desk.state.way is None
 
     runner.run(scenario())
@@ -182,7 +183,7 @@ def test_a_way_that_was_judged_for_another_vehicle_is_not_this_one_s(
         bench.desk.on_link("udp/2/1")
         assert bench.desk.state.way is None
         with pytest.raises(NotFoundError):
-            await bench.desk.fly(ME, FlyWayBody(id=up.id))
+            await bench.fly(FlyWayBody(id=up.id))
 
         async def judged_late(*arguments: Any) -> WayJudged:
             judged: WayJudged = await lane.call(*arguments)
@@ -205,7 +206,7 @@ def test_a_paused_way_that_is_flown_again_while_the_next_is_judged_stays_on_show
     async def scenario() -> None:
         bench = WayBench(made, lane)
         way = await bench.judged(action="height", height_m=20.0)
-        await bench.desk.fly(ME, FlyWayBody(id=way.id))
+        await bench.fly(FlyWayBody(id=way.id))
         bench.live.flight = FlightStatus("guided", "paused")
         asked = asyncio.create_task(bench.judged(action="height", height_m=25.0))
         while not bench.desk.state.is_judging:
@@ -242,7 +243,7 @@ def test_what_cannot_be_judged_is_said_with_what_to_do(made: Made, lane: Lane, r
             await bench.judged(action="height")
         up = await bench.judged(action="take_off", height_m=12.0)
         assert up.problem is None
-        await bench.desk.fly(ME, FlyWayBody(id=up.id))
+        await bench.fly(FlyWayBody(id=up.id))
         assert isinstance(bench.vehicle.told[-1], StartGuided)
 
         without = WayBench(made, lane)
@@ -300,3 +301,45 @@ def test_the_way_back_begins_at_the_top_of_the_take_off() -> None:
     assert [place[2] for place in places] == [8.0, 8.0, 9.0]
     assert [place[2] for place in flown_places(climb)] == [8.0]
     assert flown_places([]) == ()
+
+
+def test_a_way_to_another_vehicle_is_refused_and_so_is_one_that_another_came_into(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    async def scenario() -> None:
+        bench = WayBench(made, lane)
+        place = bench.beside(30.0, 0.0)
+        up = await bench.judged(action="to", place=place, height_m=20.0)
+        alt_m = bench.live.way.places[-1][2] if bench.live.way else math.nan
+        hovers = replace(
+            bench.live.state or VehicleState(1, 1),
+            lat_deg=place.lat_deg,
+            lon_deg=place.lon_deg,
+            alt_rel_home_m=alt_m,
+            alt_amsl_m=(bench.live.state.home_alt_amsl_m or 0.0) + alt_m if bench.live.state else None,
+        )
+        bench.others = [Flown("Bee", hovers, None)]
+        with pytest.raises(CheckNeededError, match="may come within 0 m of Bee in"):
+            await bench.fly(FlyWayBody(id=up.id))
+        assert bench.live.led is None
+        way = await bench.judged(action="to", place=place, height_m=20.0)
+        assert (way.problem, way.reasons[0].code) == ("others", "others")
+        assert "lead Bee away" in way.reasons[0].mend
+        with pytest.raises(NotCertifiedError, match="Another vehicle is in the way: It may come within 0 m of Bee"):
+            await bench.fly(FlyWayBody(id=way.id, accept_return=True))
+        assert not any(isinstance(request, FlyWay) for request in bench.vehicle.told)
+        bench.others = []
+        way = await bench.judged(action="to", place=place, height_m=20.0)
+        await bench.fly(FlyWayBody(id=way.id))
+        bench.live.flight = FlightStatus("guided", "flying")
+        ahead = bench.live.ahead()
+        assert ahead is not None
+        left_s = float(ahead.t_s[-1])
+        await bench.desk.set_speed(ME, WaySpeedBody(speed_m_s=way.speed_m_s / 2))
+        slower = bench.live.ahead()
+        assert slower is not None
+        assert float(slower.t_s[-1]) == pytest.approx(2 * left_s)
+        bench.desk.on_flight(FlightStatus("guided", "landed", since_utc_s=time.time()))
+        assert bench.live.led is None
+
+    runner.run(scenario())

@@ -19,7 +19,7 @@ from server.schemas import FlyWayBody
 from server.work.jobs import Lane
 from telemetry.topics.obstacles import MapOrigin
 from telemetry.topics.requests import FlyWay
-from tests.server.flying_desk_bench import ME, Made
+from tests.server.flying_desk_bench import Made
 from tests.server.in_flight_benches import WayBench
 from tests.server.obstacle_messages import delta
 
@@ -77,16 +77,16 @@ def test_a_way_near_which_more_is_seen_since_it_was_judged_is_not_flown(
         assert is_more_seen_near((), seen, line, 1000.0)
         radar.fold(delta([(16, 1, 34)], since=3, revision=4, **told))
         with pytest.raises(CheckNeededError, match="seen more near the way") as refused:
-            await bench.desk.fly(ME, FlyWayBody(id=way.id))
+            await bench.fly(FlyWayBody(id=way.id))
         assert refused.value.advice == "Ask for the way again."
         radar.fold(delta([(16, 1, 34)], 20, since=4, revision=5, **told))
         monkeypatch.setattr(way_desk, "SEEN_WITHIN_S", 0.0)
         radar.fold(delta(old, whole=True, revision=6, parts=2, **told))
         with pytest.raises(NotReadyError, match="Parts of the radar map"):
-            await bench.desk.fly(ME, FlyWayBody(id=way.id))
+            await bench.fly(FlyWayBody(id=way.id))
         assert bench.vehicle.told == []
         radar.fold(delta([], whole=True, revision=6, part=1, parts=2, **told))
-        await bench.desk.fly(ME, FlyWayBody(id=way.id))
+        await bench.fly(FlyWayBody(id=way.id))
         assert isinstance(bench.vehicle.told[-1], FlyWay)
 
     runner.run(scenario())
@@ -112,7 +112,7 @@ def test_a_way_is_not_flown_where_more_is_seen_near_a_return_to_a_rally_point_fr
         assert [way.problem for way in ways] == [None, None], ways[-1].reasons
         radar.fold(delta([(0, 64, 1)], since=3, revision=4, **told))
         with pytest.raises(CheckNeededError, match="seen more near the way"):
-            await bench.desk.fly(ME, FlyWayBody(id=ways[-1].id))
+            await bench.fly(FlyWayBody(id=ways[-1].id))
         assert bench.vehicle.told == []
 
     runner.run(scenario())
@@ -177,9 +177,9 @@ def test_who_walks_about_beside_a_take_off_is_no_matter_unless_he_is_near_it(
         assert way.problem is None, way.reasons
         radar.fold(delta([(1, 1, 0)], whole=True, origin=origin))
         with pytest.raises(CheckNeededError, match="seen more near the way"):
-            await bench.desk.fly(ME, FlyWayBody(id=way.id))
+            await bench.fly(FlyWayBody(id=way.id))
         radar.fold(delta([(12, 8, 0), (12, 8, 1)], whole=True, revision=2, origin=origin))
-        await bench.desk.fly(ME, FlyWayBody(id=way.id))
+        await bench.fly(FlyWayBody(id=way.id))
         assert bench.vehicle.told
 
     runner.run(scenario())

@@ -1904,8 +1904,8 @@ export interface WaySpeedBody {
 export interface WayDoc {
   id: string;
   action: "take_off" | "to" | "height" | "look" | "orbit" | "home" | "rally" | "back";
-  /** null: certified. "return": the way itself is clear, the vehicle's own return from it would not be. */
-  problem: "way" | "return" | null;
+  /** null: certified. "return": the way itself is clear, the vehicle's own return from it would not be. "others": it is clear, and would lead near another vehicle of the station's in the air. */
+  problem: "way" | "return" | "others" | null;
   /** It is being flown. */
   flies: boolean;
   /** Where it is not what was asked for: sentences. */

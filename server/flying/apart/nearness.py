@@ -90,11 +90,7 @@ class Nearness:
 
     async def look(self) -> None:
         """A second in the life of all pairs; the sums are done beside the event loop."""
-        flown = {
-            number: Flown(name, channel.state, channel.follower.ahead(channel.flight))
-            for number, (name, channel) in self._channels.items()
-            if channel.state is not None and channel.in_air and channel.state.lat_deg is not None
-        }
+        flown = in_the_air(self._channels)
         now_s = self._now_mono_s()
         # One's own first, and told at once: whatever others tell delays no alarm between these.
         self._own = _near(await asyncio.to_thread(found_among, flown, now_s), self._own)
@@ -106,6 +102,15 @@ class Nearness:
         self.alarms = self._of_others | {
             number: _both(of, self._of_others.get(number)) for number, of in of_own.items()
         }
+
+
+def in_the_air(channels: Mapping[int, tuple[str, Channel]]) -> dict[int, Flown]:
+    """One's own, by their numbers: those whose place is known."""
+    return {
+        number: Flown(name, channel.state, channel.ahead())
+        for number, (name, channel) in channels.items()
+        if channel.state is not None and channel.in_air and channel.state.lat_deg is not None
+    }
 
 
 def _near(found: Mapping[Pair, Nearest], before: Mapping[Pair, Nearest]) -> dict[Pair, Nearest]:
@@ -160,7 +165,7 @@ def found_among(flown: Mapping[int, Flown], now_s: float) -> dict[Pair, Nearest]
 
 def found_elsewhere(flown: Mapping[int, Flown], now_s: float, others: Mapping[str, Flown]) -> dict[Pair, Nearest]:
     """How near other stations' come to one's own; without those that are too far away for any alarm."""
-    reach_m = {key: max(_reach_m(each, now_s) for each in _both_ways(of)) for key, of in others.items()}
+    reach_m = {key: max(_reach_m(each, now_s) for each in both_ways(of)) for key, of in others.items()}
     found: dict[Pair, Nearest] = {}
     for one, own in flown.items():
         own_m = _reach_m(own, now_s)
@@ -201,11 +206,11 @@ def near_each_other(one: Flown, other: Flown, now_s: float) -> Nearest | None:
 
     Of another station's both ways count: straight on, and the line that is told; the nearer, then the sooner is it.
     """
-    found = [at for way in _both_ways(other) if (at := _near_on(one, way, now_s)) is not None]
+    found = [at for way in both_ways(other) if (at := _near_on(one, way, now_s)) is not None]
     return min(found, key=lambda at: (at.distance_m, at.t_s), default=None)
 
 
-def _both_ways(of: Flown) -> tuple[Flown, ...]:
+def both_ways(of: Flown) -> tuple[Flown, ...]:
     return (of,) if of.told is None else (of, of.told)
 
 

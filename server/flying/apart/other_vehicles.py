@@ -60,7 +60,7 @@ class Other:
     flown: Flown
     flies: bool
     on_board: Whole | None
-    """Verified, and known here."""
+    """Verified, and known here; None, too, while it is led along another way."""
     waits_in_air: bool = False
     """It holds, and what is on board was taken up and is not flown yet."""
 
@@ -85,9 +85,9 @@ class _Met:
 
 
 def known(name: str, channel: Channel, *, is_verified: bool, waits_in_air: bool = False) -> Other:
-    state, follower = channel.state, channel.follower
-    flown = Flown(name, state or VehicleState(0, 0), follower.ahead(channel.flight))
-    return Other(flown, channel.in_air, follower.whole() if is_verified else None, waits_in_air)
+    flown = Flown(name, channel.state or VehicleState(0, 0), channel.ahead())
+    follows = is_verified and not (channel.in_air and channel.is_led_apart and not waits_in_air)
+    return Other(flown, channel.in_air, channel.follower.whole() if follows else None, waits_in_air)
 
 
 class OtherVehicles:
@@ -244,7 +244,6 @@ def _together(row: CheckRow, elsewhere: CheckRow) -> CheckRow:
 def _against(who: Other, mine: Whole, other: Other, now_s: float) -> CheckRow | None:
     """None: it does not come near."""
     name, theirs, state = other.flown.name, other.flown.state, who.flown.state
-    begun, begin = ("Resumed", "Resume") if who.waits_in_air else ("Started", "Start")
     origin_deg = float(mine.lat_lon_deg[0, 0]), float(mine.lat_lon_deg[0, 1])
     flat = _home_alt_m(state) is None or _home_alt_m(theirs) is None
     way_m = _way_m(mine, origin_deg, state, flat=flat)
@@ -256,6 +255,10 @@ def _against(who: Other, mine: Whole, other: Other, now_s: float) -> CheckRow | 
         text = f"{name} has a mission on board that comes within {met.distance_m:.0f} m of this one,"
         return _row("accept", f"{text} at {_place(origin_deg, met)}.", "Fly one after the other, or plan them apart.")
     if other.flown.ahead is None or other.on_board is None or theirs.lat_deg is None:
+        here = None if theirs.lat_deg is None else line_of(other.flown, origin_deg, now_s, flat=flat, ahead_s=HORIZON_S)
+        met = None if here is None else _first([(one, here) for one in _timed(mine, way_m, now_s)], now_s)
+        if met is not None:
+            return _too_near(who, name, met, origin_deg, now_s)
         text = f"{name} is in the air, and no plan tells where it will be."
         return _row("accept", text, "Agree with whoever flies it.")
     theirs_ahead = [line_of(other.flown, origin_deg, now_s, flat=flat, ahead_s=None)]
@@ -263,14 +266,22 @@ def _against(who: Other, mine: Whole, other: Other, now_s: float) -> CheckRow | 
     theirs_ahead.append(_home(their_way_m[-_HOME_POINTS:], float(theirs_ahead[0].t_s[-1]), now_s))
     if min(ways_apart(way_m, line.points_enu_m, radius_m=line.radius_m).distance_m for line in theirs_ahead) >= NEAR_M:
         return None
-    pairs = [(one, line) for one in _timed(mine, way_m, now_s) for line in theirs_ahead]
-    found = [
-        met for one, line in pairs if (met := nearest(one, line, since_s=now_s)) is not None and met.distance_m < NEAR_M
-    ]
-    if not found:
+    met = _first([(one, line) for one in _timed(mine, way_m, now_s) for line in theirs_ahead], now_s)
+    if met is None:
+        begin = "Resume" if who.waits_in_air else "Start"
         text = f"Its line comes near that of {name}, but by the predicted times not while {name} is there."
         return _row("accept", text, f"{begin} now or once {name} has landed, and watch both.")
-    met = min(found, key=lambda one: (one.distance_m, one.t_s))
+    return _too_near(who, name, met, origin_deg, now_s)
+
+
+def _first(pairs: Sequence[tuple[TimedLine, TimedLine]], now_s: float) -> Nearest | None:
+    """Where both come nearest; None: nowhere too near."""
+    found = [met for one, other in pairs if (met := nearest(one, other, since_s=now_s)) and met.distance_m < NEAR_M]
+    return min(found, key=lambda one: (one.distance_m, one.t_s), default=None)
+
+
+def _too_near(who: Other, name: str, met: Nearest, origin_deg: tuple[float, float], now_s: float) -> CheckRow:
+    begun, begin = ("Resumed", "Resume") if who.waits_in_air else ("Started", "Start")
     text = f"{begun} now, it may come within {met.distance_m:.0f} m of {name} in {max(0.0, met.t_s - now_s):.0f} s,"
     return _row("bad", f"{text} at {_place(origin_deg, met)}.", f"{begin} later, or land {name} first.")
 

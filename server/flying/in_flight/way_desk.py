@@ -11,8 +11,10 @@ from dataclasses import dataclass, replace
 from mapping.geometry.frames import apart_m
 from planning.guided.guided_model import RETURNS
 from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotFoundError, NotReadyError
+from server.flying.apart.way_apart import Apart, Others, way_apart
 from server.flying.in_flight.way_task import WayAsked, WayJudged, judge_way
 from server.heard.channel import Channel, ShownWay
+from server.heard.led_way import LedWay
 from server.library import Library
 from server.obstacles.coming_down_task import SHADOW_M
 from server.obstacles.obstacle_watch import Watch
@@ -94,7 +96,7 @@ class WayDesk:
     def state(self) -> GuidedState:
         return GuidedState(way=None if self._in_hand is None else self._in_hand.doc, is_judging=self._is_judging)
 
-    async def judge(self, operator: Operator, body: WayBody) -> GuidedState:
+    async def judge(self, operator: Operator, body: WayBody, others: Others) -> GuidedState:
         """Nothing moves. Raises what the vehicle said, NotAllowedError, NotReadyError, MissionError, ParameterError."""
         if self._is_judging:
             raise ConflictError("Another way is being judged.", advice="Wait until it is done.")
@@ -113,25 +115,26 @@ class WayDesk:
             home = home_of(asked.state)
             notes = await self.seen_before(asked.maps, _looked_along(judged, home), _required_m(judged))
             self._check_still(vehicle, flown)
-            doc = _doc(judged, body, terrain, notes)
+            apart = await self._apart(judged, others)
+            doc = _doc(judged, body, terrain, notes, apart)
             self._in_hand = _InHand(doc, judged, time.monotonic(), home, asked.maps)
         finally:
             self._is_judging = False
             self._tell()
         return self.state
 
-    async def fly(self, operator: Operator, body: FlyWayBody) -> None:
-        """Raises NotFoundError, NotCertifiedError, CheckNeededError where home was moved or more was seen since, and
-        NotAllowedError where the vehicle is elsewhere by now."""
+    async def fly(self, operator: Operator, body: FlyWayBody, others: Others) -> None:
+        """Raises NotFoundError, NotCertifiedError, CheckNeededError where home was moved, more was seen, or another
+        vehicle came into its way since, and NotAllowedError where the vehicle is elsewhere by now."""
         if self._is_ordering:
             raise ConflictError("A way is being ordered.", advice="Wait until it is flown or refused.")
         self._is_ordering = True
         try:
-            await self._order(operator, body)
+            await self._order(operator, body, others)
         finally:
             self._is_ordering = False
 
-    async def _order(self, operator: Operator, body: FlyWayBody) -> None:
+    async def _order(self, operator: Operator, body: FlyWayBody, others: Others) -> None:
         in_hand = self._in_hand
         if in_hand is None or in_hand.doc.id != body.id or in_hand.doc.flies:
             raise NotFoundError(NOWHERE, advice="Ask for the way again.")
@@ -139,11 +142,13 @@ class WayDesk:
         if time.monotonic() - in_hand.judged_mono_s > CHECK_FRESH_S:
             what = f"The way was judged more than {CHECK_FRESH_S:.0f} s ago: more may have been seen since."
             raise CheckNeededError(what, advice="Ask for the way again.")
-        if doc.problem == "way" or (doc.problem == "return" and not body.accept_return):
+        if doc.problem in ("way", "others") or (doc.problem == "return" and not body.accept_return):
             first = doc.reasons[0] if doc.reasons else None
-            what = "The way is not certified" + ("." if first is None else f": {first.text}")
+            what = "Another vehicle is in the way" if doc.problem == "others" else "The way is not certified"
+            what += "." if first is None else f": {first.text}"
             raise NotCertifiedError(what, advice="" if first is None else first.mend)
         await self._check_seen(in_hand)
+        await self._check_apart(in_hand, others)
         self._check_home(in_hand)
         since_utc_s = time.time()
         speed_m_s, most_m_s = judged.speed_m_s, judged.most_m_s
@@ -152,12 +157,15 @@ class WayDesk:
         if self._in_hand is in_hand:
             doc = doc.model_copy(update={"flies": True})
             self._in_hand = replace(in_hand, doc=doc, flies_since_utc_s=since_utc_s)
+            self._live.led = LedWay(judged.way.places, judged.way.t_s)
             self._tell()
 
     async def set_speed(self, operator: Operator, body: WaySpeedBody) -> None:
         """Raises NotAllowedError where no way is flown, or it is certified for less."""
         await self._link.call(SetSpeed(operator, body.speed_m_s))
         if (in_hand := self._in_hand) is not None and in_hand.doc.flies:
+            if self._live.led is not None:
+                self._live.led.slowed(in_hand.doc.speed_m_s / body.speed_m_s)
             doc = in_hand.doc.model_copy(update={"speed_m_s": body.speed_m_s})
             self._in_hand = replace(in_hand, doc=doc)
             self._tell()
@@ -266,6 +274,21 @@ class WayDesk:
             what = "Sensors have seen more near the way since it was judged."
             raise CheckNeededError(what, advice="Ask for the way again.")
 
+    async def _apart(self, judged: WayJudged, others: Others) -> Apart:
+        """By where all are now."""
+        way = judged.way
+        return await asyncio.to_thread(
+            way_apart, self._vehicle(), way.places, way.t_s, tuple(others()), time.monotonic()
+        )
+
+    async def _check_apart(self, in_hand: _InHand, others: Others) -> None:
+        """Raises CheckNeededError where it would lead near another vehicle of the station's by now."""
+        reasons = (await self._apart(in_hand.judged, others)).reasons
+        if self._in_hand is not in_hand:
+            raise NotFoundError(NOWHERE, advice="Ask for the way again.")
+        if reasons:
+            raise CheckNeededError(reasons[0].text, advice=reasons[0].mend)
+
     def _check_home(self, in_hand: _InHand) -> None:
         """Raises CheckNeededError where home was moved since: the way's places would be elsewhere. A vehicle on the
         ground takes its home when it arms, which is looked at then."""
@@ -304,6 +327,8 @@ class WayDesk:
 
     def _tell(self) -> None:
         in_hand = self._in_hand
+        if in_hand is None or not in_hand.doc.flies:
+            self._live.led = None
         self._live.way = None if in_hand is None else ShownWay(in_hand.judged.way.places, in_hand.doc.problem is None)
         self._pages.publish(GuidedMessage(guided=self.state))
 
@@ -321,14 +346,16 @@ def _looked_along(judged: WayJudged, home: HomePlace | None) -> list[tuple[float
     return [*places, *ends]
 
 
-def _doc(judged: WayJudged, body: WayBody, terrain: TerrainDoc, notes: list[str]) -> WayDoc:
+def _doc(judged: WayJudged, body: WayBody, terrain: TerrainDoc, notes: list[str], apart: Apart) -> WayDoc:
     way = judged.way
+    problem = way.problem if way.problem == "way" or not apart.reasons else "others"
+    reasons = [ReasonDoc(code=reason.code, text=reason.text, mend=reason.mend) for reason in way.certificate.reasons]
     return WayDoc(
         id=secrets.token_hex(8),
         action=body.action,
-        problem=way.problem,
-        notes=[*way_notes(way), *notes],
-        reasons=[ReasonDoc(code=reason.code, text=reason.text, mend=reason.mend) for reason in way.certificate.reasons],
+        problem=problem,
+        notes=[*way_notes(way), *notes, *apart.notes],
+        reasons=[*apart.reasons, *reasons] if problem == "others" else [*reasons, *apart.reasons],
         clearance_m=way.clearance_m if math.isfinite(way.clearance_m) else None,
         required_m=way.certificate.required_clearance_m,
         length_m=way.length_m,

@@ -177,7 +177,12 @@ function Wish() {
   );
 }
 
-const VERDICTS = { none: "CERTIFIED", way: "NOT CERTIFIED", return: "RETURN NOT CLEAR" } as const;
+const VERDICTS = {
+  none: "CERTIFIED",
+  way: "NOT CERTIFIED",
+  return: "RETURN NOT CLEAR",
+  others: "VEHICLE IN THE WAY",
+} as const;
 
 function Facts({ way }: { way: WayDoc }) {
   return (
@@ -234,7 +239,7 @@ function Way({ way }: { way: WayDoc }) {
         )
       ) : (
         <div class="row wrap">
-          {way.problem !== "way" && (
+          {way.problem !== "way" && way.problem !== "others" && (
             <HoldButton
               label={isClear ? "Fly it" : "Fly it all the same"}
               icon="play"

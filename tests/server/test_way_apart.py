@@ -1,0 +1,117 @@
+"""A guided way is held apart from the other vehicles in the air, as they are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mapping.geometry.frames import moved_deg, offset_m
+from server.flying.apart.nearness import AHEAD_S, NEAR_M, RADIUS_M, Flown
+from server.flying.apart.way_apart import NEARER_M, Apart, way_apart
+from server.heard.plan_follower import Ahead
+from telemetry.topics.vehicle import VehicleState
+
+HOME = 47.0, 8.0
+HOME_ALT_M, UP_M, SPEED_M_S = 480.0, 20.0, 3.0
+NOW_S = 1000.0
+
+
+def at(east_m: float, north_m: float = 0.0, *, up_m: float = UP_M, **more: Any) -> VehicleState:
+    lat_deg, lon_deg = moved_deg(HOME, east_m, north_m)
+    state = VehicleState(1, 1, armed=True, landed="in_air", position_t_mono_s=NOW_S, lat_deg=lat_deg, lon_deg=lon_deg)
+    heights = {"alt_amsl_m": HOME_ALT_M + up_m, "home_alt_amsl_m": HOME_ALT_M, "alt_rel_home_m": up_m}
+    return replace(state, **heights, **more)
+
+
+def way(*east_north_m: tuple[float, float], others: list[Flown], state: VehicleState | None = None) -> Apart:
+    """Level, at 3 m/s, from its first place on."""
+    line_m = np.array(east_north_m)
+    t_s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line_m, axis=0), axis=1))]) / SPEED_M_S
+    places = [(*moved_deg(HOME, *place), UP_M) for place in east_north_m]
+    return way_apart(state or at(*east_north_m[0]), places, t_s, others, NOW_S)
+
+
+def ahead(*east_north_s: tuple[float, float, float]) -> Ahead:
+    places = np.array([moved_deg(HOME, *each[:2]) for each in east_north_s])
+    return Ahead(places, np.full(len(places), UP_M), np.array([each[2] for each in east_north_s]))
+
+
+def test_a_way_to_where_another_one_hovers_is_refused_however_long_it_takes() -> None:
+    for far_m in (30.0, 600.0):
+        apart = way((0.0, 0.0), (far_m, 0.0), others=[Flown("Bee", at(far_m), None)])
+        (reason,) = apart.reasons
+        assert reason.code == "others"
+        assert reason.text.startswith("It may come within 0 m of Bee in ")
+        assert "lead Bee away or land it first" in reason.mend
+    assert way((0.0, 0.0), (30.0, 0.0), others=[Flown("Bee", at(30.0, up_m=60.0), None)]) == Apart()
+    assert way((0.0, 0.0), (30.0, 0.0), others=[Flown("Bee", at(30.0, 30.0), None)]) == Apart()
+
+
+def test_one_whose_height_is_not_known_is_as_high() -> None:
+    high = replace(at(30.0, up_m=60.0), alt_amsl_m=None)
+    assert way((0.0, 0.0), (30.0, 0.0), others=[Flown("Bee", high, None)]).reasons
+
+
+def test_who_crosses_by_his_plan_is_met_or_not_by_the_times_of_both() -> None:
+    crosses = at(60.0, -60.0, v_north_m_s=SPEED_M_S)
+    meets = Flown("Bee", crosses, ahead((60.0, 0.0, 20.0), (60.0, 60.0, 40.0)))
+    waits = Flown("Bee", crosses, ahead((60.0, -60.0, 300.0), (60.0, 60.0, 340.0)))
+    assert way((0.0, 0.0), (120.0, 0.0), others=[meets]).reasons
+    assert way((0.0, 0.0), (120.0, 0.0), others=[waits]) == Apart()
+    # It holds where it ends: on the other one's line, not for ever.
+    comes = Flown("Bee", crosses, ahead((60.0, -60.0, AHEAD_S), (60.0, 60.0, AHEAD_S + 40.0)))
+    assert way((0.0, 0.0), (60.0, 0.0), others=[comes]).reasons
+
+
+def test_who_begins_too_near_may_leave_and_comes_no_nearer() -> None:
+    near = [Flown("Bee", at(8.0), None)]
+    assert way((0.0, 0.0), (-40.0, 0.0), others=near) == Apart()
+    assert way((0.0, 0.0), (-3.0, 0.0), (40.0, 0.0), others=near).reasons
+    assert way((0.0, 0.0), (NEARER_M + 1.0, 0.0), others=near).reasons
+
+
+def test_what_nobody_here_can_hold_is_said_and_refuses_nothing() -> None:
+    there = Flown("Bravo's Bee", at(30.0), None, key="Bravo/1")
+    apart = way((0.0, 0.0), (30.0, 0.0), others=[there])
+    assert apart.reasons == ()
+    assert apart.notes[0].startswith("It may come within 0 m of Bravo's Bee in ")
+    assert "call the other station" in apart.notes[0]
+    silent = Flown("Bravo's Bee", at(900.0), None, is_silent=True, key="Bravo/1")
+    assert "not heard any more" in way((0.0, 0.0), (30.0, 0.0), others=[silent]).notes[0]
+    by_hand = Flown("Bee", at(900.0, v_east_m_s=4.0), None)
+    assert way((0.0, 0.0), (30.0, 0.0), others=[by_hand]).notes == (
+        "Bee is in the air, and no plan tells where it will be.",
+    )
+    told = Flown("Bravo's Bee", at(900.0), None, key="Bravo/1", told=Flown("Bravo's Bee", at(30.0), None))
+    assert way((0.0, 0.0), (30.0, 0.0), others=[told]).notes
+
+
+@given(st.floats(-60, 60), st.floats(-60, 60), st.floats(-60, 60), st.floats(-60, 60))
+def test_no_way_that_is_let_through_passes_a_standing_one_too_near(
+    east_m: float, north_m: float, other_east_m: float, other_north_m: float
+) -> None:
+    """By brute force along the straight way; and none that stays well away is refused."""
+    other = at(other_east_m, other_north_m)
+    refused = bool(way((0.0, 0.0), (east_m, north_m), others=[Flown("Bee", other, None)]).reasons)
+    share = np.linspace(0.0, 1.0, 400)
+    place_m = np.array(offset_m(HOME, other.lat_deg or 0.0, other.lon_deg or 0.0))
+    off_m = np.hypot(share * east_m - place_m[0], share * north_m - place_m[1])
+    least_m = float(off_m.min())
+    if least_m > NEAR_M + 2 * RADIUS_M + 0.1:
+        assert not refused
+    elif least_m < min(NEAR_M + 2 * RADIUS_M - 0.1, float(off_m[0]) - NEARER_M - 0.1):
+        assert refused
+
+
+@pytest.mark.parametrize("lat_deg", [None, HOME[0]])
+def test_from_the_ground_it_begins_at_its_first_place(lat_deg: float | None) -> None:
+    stands = replace(at(0.0, up_m=0.0), armed=False, landed="on_ground", lat_deg=lat_deg)
+    places = [(*HOME, 0.0), (*HOME, UP_M)]
+    hovers = [Flown("Bee", at(6.0), None)]
+    assert way_apart(stands, places, np.array([0.0, 8.0]), hovers, NOW_S).reasons
+    assert way_apart(stands, places, np.array([0.0, 8.0]), [Flown("Bee", at(40.0), None)], NOW_S) == Apart()
