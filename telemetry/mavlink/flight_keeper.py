@@ -114,7 +114,8 @@ class FlightKeeper:
         # PX4 may tell of its mission's end and of its way home in one breath.
         self._completed |= self.status.way == "auto" and _is_at_end(state, _count(state, onboard))
         broke_off_at = None if self._completed else self.status.broke_off_at or self.status.target
-        self.status = replace(self.status, phase="returning", broke_off_at=broke_off_at)
+        hint = "" if self.status.phase == "flying" else self.status.hint  # of what it did, until now
+        self.status = replace(self.status, phase="returning", broke_off_at=broke_off_at, hint=hint)
 
     def _on_disarmed(self) -> None:
         if not self._was_armed or self.status.phase not in GOING_HOME_FROM:

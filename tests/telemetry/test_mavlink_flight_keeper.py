@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from telemetry.mavlink.flight_keeper import FlightKeeper, item_of, sequence_of
-from telemetry.topics.messages import FlightStatus
+from telemetry.topics.messages import FlightPhase, FlightStatus
 from telemetry.topics.onboard_lists import Item, OnboardMission
 from telemetry.topics.vehicle import VehicleState
 
@@ -163,3 +163,11 @@ def test_after_a_crash_of_the_node_a_mission_goes_on_and_a_script_does_not() -> 
     keeper = FlightKeeper()
     keeper.take_up(FlightStatus("auto", "landed", 5, 5, 1000.0))
     assert keeper.status == FlightStatus()
+
+
+@pytest.mark.parametrize(("phase", "hint"), [("flying", ""), ("paused", "Why it holds.")])
+def test_what_it_did_until_it_returns_is_not_said_of_the_return(phase: FlightPhase, hint: str) -> None:
+    keeper = FlightKeeper()
+    keeper.script(FlightStatus("guided", phase, target=3, hint="Why it holds."), armed=True)
+    keeper.on_state(VehicleState(1, 1, autopilot="ardupilot", mode="RTL", armed=True), ONBOARD, joining=False)
+    assert (keeper.status.phase, keeper.status.hint) == ("returning", hint)
