@@ -2,7 +2,7 @@ import { beforeEach, describe, expect, it } from "vitest";
 import { now_ms } from "../src/store/clock";
 import { forgetFlying, heard, lease, linkState, linkStatus, nodes, takeFlying } from "../src/store/flying";
 import { loss } from "../src/store/losses";
-import { failed, isOld, late_s, whyNotAsk, whyNotCommand, whyUnheard } from "../src/store/reach";
+import { failed, isOld, late_s, unheard_s, whyNotAsk, whyNotCommand, whyUnheard } from "../src/store/reach";
 import { forgetClock, takeClock } from "../src/store/server_clock";
 import { link } from "../src/store/state";
 import { linkStatus as status, vehicleMessage } from "./flight_samples";
@@ -77,6 +77,18 @@ describe("how far this page's word reaches", () => {
     expect([isOld("live", "position"), isOld("replay", "position")]).toEqual([true, false]);
     nodes.value = linkNode("running");
     expect(isOld("live", "battery")).toBe(false);
+  });
+
+  it("counts from when the last word was said, not from when it came, once there is no more", () => {
+    takeClock({ v: 1, type: "clock", page_ms: 0, now_mono_s: 100.2 }, 10);
+    takeFlying(vehicleMessage({ now_mono_s: 102.2 }), 10_000);
+    takeFlying({ v: 1, type: "link", link: status({ silent_s: 0.5 }) }, 10_000);
+    now_ms.value = 13_000;
+    link.value = "lost";
+    expect(unheard_s.value).toBeCloseTo(0.5 + 3 + 8, 1);
+    forgetClock();
+    now_ms.value = 14_000;
+    expect(unheard_s.value, "nothing tells how late it came").toBeCloseTo(4.5, 5);
   });
 
   it("says how late a slow line brings what the server says", () => {

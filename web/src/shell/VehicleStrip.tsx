@@ -29,7 +29,7 @@ import {
 } from "../store/flying";
 import { acknowledgeLoss, isLossCalling } from "../store/losses";
 import { pending } from "../store/outcomes";
-import { failed, isOld, late_s, whyNotCommand, whyUnheard } from "../store/reach";
+import { failed, isOld, late_s, unheard_s, whyNotCommand, whyUnheard } from "../store/reach";
 import { isReplaying, review } from "../store/review";
 import { severityWord } from "../store/texts";
 import { Chip } from "../ui/Chip";
@@ -92,7 +92,8 @@ function Safety() {
 function VehicleChips() {
   const state = vehicle.value;
   const status = linkStatus.value?.status ?? null;
-  const words = linkWords(status, silence_s.value, linkState.value, failed.value, late_s.value);
+  const silent_s = failed.value === null ? silence_s.value : unheard_s.value;
+  const words = linkWords(status, silent_s, linkState.value, failed.value, late_s.value);
   return (
     <>
       <Chip

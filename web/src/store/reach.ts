@@ -9,6 +9,7 @@ import {
   notInCharge,
   overdue_s,
   SAID_EVERY_S,
+  silence_s,
   type Source,
 } from "./flying";
 import { serverNow_s } from "./server_clock";
@@ -49,6 +50,18 @@ export const whyNotCommand = computed(() => whyUnheard.value ?? notInCharge.valu
 export const isOld = (source: Source, group: Group): boolean =>
   (source === "live" && failed.value !== null) || isStale(heard[source].value, group, now_ms.value);
 
+/** What the newest word of the vehicle took from the server to this page. */
+function newestTook_s(): number {
+  const known = heard.live.value;
+  const came_s = known && serverNow_s(known.received_ms);
+  return known && came_s !== null ? came_s - known.message.now_mono_s : 0;
+}
+
+/** Seconds since what stands here was said, once what would say more has failed; null: nothing was. */
+export const unheard_s = computed(() =>
+  silence_s.value === null ? null : silence_s.value + Math.max(0, newestTook_s()),
+);
+
 /** A line that is slower than what there is to say, from here on. */
 const LATE_S = 2;
 
@@ -59,8 +72,7 @@ const LATE_S = 2;
 export const late_s = computed<number | null>(() => {
   if (failed.value !== null) return null;
   const known = heard.live.value;
-  const came_s = known && serverNow_s(known.received_ms);
-  const took_s = known && came_s !== null ? came_s - known.message.now_mono_s : 0;
+  const took_s = newestTook_s();
   const since_s = known ? Math.max(0, now_ms.value - known.received_ms) / 1000 : 0;
   const seconds = Math.max(
     took_s,

@@ -2,7 +2,7 @@ import { withUnit } from "../format";
 import { age_s, type Group } from "../store/ages";
 import { now_ms } from "../store/clock";
 import { heard, linkState, silence_s, type Source } from "../store/flying";
-import { failed, isOld, late_s } from "../store/reach";
+import { failed, isOld, late_s, unheard_s } from "../store/reach";
 import { link } from "../store/state";
 import { Displays } from "../tracks/Displays";
 import { Icon } from "../ui/Icon";
@@ -35,7 +35,7 @@ function lostWords(): [what: string, then: string] {
 /** Over the attitude, so that nothing moves: the values below stay, greyed. */
 function Lost() {
   const [what, then] = lostWords();
-  const seconds = failed.value === null ? (late_s.value ?? silence_s.value) : silence_s.value;
+  const seconds = failed.value === null ? (late_s.value ?? silence_s.value) : unheard_s.value;
   return (
     <div class="lost-notice" role="alert" data-testid="link-lost">
       <Icon name="warning" size={28} />
