@@ -12,7 +12,7 @@ from server.door.alarms import Alarms
 from server.door.hub import Hub
 from server.errors import BadRequestError, NotFoundError, NotReadyError
 from server.flying.apart.airspace import Airspace
-from server.flying.apart.nearness import Flown, Nearness, in_the_air
+from server.flying.apart.nearness import Flown, Nearness, flown_of
 from server.flying.apart.other_stations import Meeting, OtherStations
 from server.flying.apart.other_vehicles import OtherVehicles
 from server.flying.apart.own_lines import OwnLines
@@ -166,10 +166,13 @@ class Fleet:
         return self.of(int(number))
 
     def others_in_air(self, number: int) -> list[Flown]:
-        """All but that one: the station's own, and other stations'."""
-        own = in_the_air({flying.number: (flying.name, flying.live) for flying in self.flights})
-        elsewhere = [] if self._stations is None else self._stations.flown(time.monotonic())
-        return [*(flown for key, flown in own.items() if key != number), *elsewhere]
+        """All but that one: the station's own, those that are ordered to take off with them, and other stations'."""
+        own = [
+            flown_of(flying.name, flying.live)
+            for flying in self.flights
+            if flying.number != number and (flying.live.in_air or flying.live.led is not None)
+        ]
+        return [*own, *([] if self._stations is None else self._stations.flown(time.monotonic()))]
 
     @property
     def recordings_there(self) -> RecordingsThere:

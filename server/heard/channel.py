@@ -88,12 +88,18 @@ class Channel:
         return self.flight.way == "guided" and self.flight.target is None
 
     def ahead(self) -> Ahead | None:
-        """What is left of the plan or of the single way that is flown; None where nothing tells it."""
-        if not self.is_led_apart:
-            return self.follower.ahead(self.flight)
-        if self.led is None or self.state is None or self.flight.phase != "flying":
+        """What is left of the plan that is flown; None where nothing tells it."""
+        return None if self.is_led_apart else self.follower.ahead(self.flight)
+
+    def led_ahead(self) -> Ahead | None:
+        """Of the single way that is ordered or flown, and of a plan's whole line while it takes off: where it may be
+        besides. None while a way is paused, or where nothing tells it."""
+        if self.led is not None and self.state is not None:
+            is_held = self.flight.phase == "paused" and not self.led.is_new
+            return None if is_held else self.led.ahead(self.state)
+        if self.flight.phase != "taking_off" or self.is_led_apart:
             return None
-        return self.led.ahead(self.state)
+        return self.follower.rising()
 
     @property
     def battery(self) -> str:

@@ -29,6 +29,8 @@ NO_FLIGHT = FlightStatus()
 _OFF_PLAN = ("returning", "landed", "interrupted")
 OFF_LINE_M = 15.0
 """Who is farther from its line has left it: other stations are not told that it flies that."""
+EARLY_LATE_S, EARLY_LATE_SHARE = 2.0, 0.1
+"""Of a plan's predicted times: so much earlier or later, and that share of the time until then."""
 MARGIN_M = 400.0
 """Around a plan: what lies farther away is not asked for, and a large model would take seconds and gigabytes."""
 
@@ -71,7 +73,7 @@ class Followed:
 
 @dataclass(frozen=True, slots=True)
 class Ahead:
-    """What is left of a plan that is being flown, as predicted from the last position on."""
+    """What is left of a line that is being flown, as predicted from the last position on."""
 
     lat_lon_deg: F64
     """(N, 2)"""
@@ -79,6 +81,11 @@ class Ahead:
     """(N,)"""
     t_s: F64
     """(N,) seconds from now; never falling"""
+    early_late_s: float = EARLY_LATE_S
+    early_late_share: float = EARLY_LATE_SHARE
+    """So much earlier or later it may be there: that, and that share of ``t_s``."""
+    off_m: float = 0.0
+    """So far beside the line it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,6 +166,21 @@ class Follower:
         return Ahead(
             lat_lon_deg, points_m[:, 2] - reference.home_alt_dsm_m, np.maximum.accumulate(np.maximum(t_s, 0.0))
         )
+
+    def rising(self) -> Ahead | None:
+        """All of a plan's line, while the vehicle takes off: anywhere up to its first waypoint it may be for as long as
+        that takes."""
+        followed = self._followed
+        if followed is None or followed.begins_in_air:
+            return None
+        reference = followed.reference
+        t_s = np.maximum.accumulate(np.column_stack([reference.arrive_s, reference.leave_s]).ravel())
+        if not len(t_s) or not np.isfinite(t_s).all():
+            return None
+        points_m = np.repeat(reference.points_m, 2, axis=0)
+        lat_lon_deg = followed.placer.dsm.lat_lon_from_xy(points_m[:, :2])
+        up_m, early_s = points_m[:, 2] - reference.home_alt_dsm_m, EARLY_LATE_S + reference.takeoff_s
+        return Ahead(lat_lon_deg, up_m, np.maximum(t_s, 0.0), early_late_s=early_s)
 
     @property
     def followed(self) -> Followed | None:

@@ -11,6 +11,7 @@ import pytest
 
 from mapping.geometry.frames import moved_deg
 from server.flying.apart.nearness import NEAR_M, OVER_M, RADIUS_M, Flown, Nearness, near_each_other
+from server.heard.led_way import led_ahead
 from server.heard.plan_follower import Ahead
 from telemetry.topics.vehicle import VehicleState
 
@@ -95,6 +96,9 @@ class _Channel:
     def ahead(self) -> None:
         return None
 
+    def led_ahead(self) -> None:
+        return None
+
 
 def test_both_have_the_alarm_until_they_are_well_apart() -> None:
     pair = Pair()
@@ -114,3 +118,24 @@ def test_on_the_ground_vehicles_may_stand_side_by_side() -> None:
     pair = Pair()
     pair.in_air = False
     assert pair.alarms(0.0) == {}
+
+
+def test_a_way_that_is_led_adds_to_straight_on_and_takes_nothing_away() -> None:
+    there = np.array([[*moved_deg(HOME, 60.0, 0.0), 20.0]])
+
+    def led(state: VehicleState) -> Flown:
+        told = Flown("Bee", state, led_ahead(there, np.array([20.0]), 12.0))
+        return Flown("Bee", state, None, told=told)
+
+    hovers = Flown("Wasp", flying(60), None)
+    found = near_each_other(led(flying(0)), hovers, NOW_S)
+    assert found is not None
+    assert found.distance_m == 0.0
+    found = near_each_other(hovers, led(flying(0)), NOW_S)
+    assert found is not None
+    assert found.distance_m == 0.0
+    # Avoidance has led it 12 m above its way, and it flies straight at the other one there.
+    above = flying(30, up_m=512.0, v_east_m_s=3.0)
+    found = near_each_other(led(above), Flown("Wasp", flying(60, up_m=515.0), None), NOW_S)
+    assert found is not None
+    assert found.distance_m == 0.0

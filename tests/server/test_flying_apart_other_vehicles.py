@@ -12,6 +12,7 @@ import pytest
 from mapping.geometry.frames import moved_deg
 from server.flying.apart.nearness import NEAR_M, RADIUS_M, Flown
 from server.flying.apart.other_vehicles import PENDING, Other, OtherVehicles, row_against
+from server.heard.led_way import led_ahead
 from server.heard.plan_follower import Ahead, Whole
 from server.schemas import CheckRow
 from telemetry.topics.vehicle import VehicleState
@@ -229,10 +230,25 @@ def test_who_stands_on_its_way_is_in_it_until_he_is_led_away() -> None:
     assert row.mend == "Start later, or land Bee first."
     higher = replace(hovers, flown=replace(hovers.flown, state=replace(state, alt_amsl_m=HOME_ALT_M + 45.0)))
     assert told(standing(EAST), higher).state == "accept"
+    # Nobody knows whether it is still there.
+    long_ago = replace(state, position_t_mono_s=NOW_S - 60.0)
+    assert told(standing(EAST), replace(hovers, flown=Flown("Bee", long_ago, None))).state == "accept"
 
     def led(north_m: float) -> Other:
-        away = Ahead(np.array([moved_deg(HOME, 300, north_m)]), np.array([20.0]), np.array([abs(north_m) / SPEED_M_S]))
-        return replace(hovers, flown=replace(hovers.flown, ahead=away))
+        aside = replace(state, lat_deg=moved_deg(HOME, 300, 100.0)[0])
+        places = np.array([(*moved_deg(HOME, 300, north_m), 20.0)])
+        way = led_ahead(places, np.array([abs(100.0 - north_m) / SPEED_M_S]))
+        return replace(hovers, flown=Flown("Bee", aside, None, told=Flown("Bee", aside, way)))
 
-    assert told(standing(EAST), led(100.0)).state == "accept"
+    assert told(standing(EAST), led(50.0)).state == "accept"
     assert told(standing(EAST), led(3.0)).state == "bad"
+
+
+def test_who_holds_beside_another_one_may_go_on_away_from_it() -> None:
+    mine = standing(EAST)
+    here = replace(mine, waits_in_air=True, flies=True)
+    lat_deg, lon_deg = moved_deg(HOME, -9.0, 0)
+    beside = replace(flying(ACROSS, 20.0).flown.state, lat_deg=lat_deg, lon_deg=lon_deg, alt_amsl_m=HOME_ALT_M)
+    other = Other(Flown("Bee", beside, None), flies=True, on_board=None)
+    assert told(here, other).state == "accept"
+    assert told(mine, other).state == "bad"

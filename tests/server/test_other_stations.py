@@ -211,7 +211,8 @@ def test_both_alarms_name_the_other_station_and_only_ours_can_be_held() -> None:
         state=VehicleState(1, 1, armed=True, position_t_mono_s=NOW_S, lat_deg=47.0, lon_deg=8.0, alt_amsl_m=500.0),
         in_air=True,
         flight=None,
-        follower=SimpleNamespace(ahead=lambda flight: None),
+        ahead=lambda: None,
+        led_ahead=lambda: None,
     )
     desk = Desk(other(2 * RADIUS_M + NEAR_M - 1.0))
     nearness = Nearness({1: ("Bee", channel)}, elsewhere=desk.it.flown, now_mono_s=lambda: NOW_S)
@@ -240,7 +241,7 @@ def _own_pair(desk: Desk) -> Nearness:
             1, 1, armed=True, position_t_mono_s=NOW_S, lat_deg=lat_deg, lon_deg=lon_deg, alt_amsl_m=500.0,
             v_east_m_s=east_m_s, v_north_m_s=0.0, v_down_m_s=0.0,
         )  # fmt: skip
-        return SimpleNamespace(state=state, in_air=True, flight=None, follower=SimpleNamespace(ahead=lambda _: None))
+        return SimpleNamespace(state=state, in_air=True, flight=None, ahead=lambda: None, led_ahead=lambda: None)
 
     channels = {1: ("Bee", channel(0.0, 5.0)), 2: ("Fly", channel(20.0, -5.0))}
     return Nearness(channels, elsewhere=desk.it.flown, now_mono_s=lambda: NOW_S)
@@ -287,9 +288,7 @@ def test_a_station_of_which_the_node_no_longer_tells_is_lost_with_words() -> Non
 
 def test_an_alarm_does_not_end_because_the_other_one_is_not_heard_any_more() -> None:
     state = VehicleState(1, 1, armed=True, position_t_mono_s=NOW_S, lat_deg=47.0, lon_deg=8.0, alt_amsl_m=500.0)
-    channel: Any = SimpleNamespace(
-        state=state, in_air=True, flight=None, follower=SimpleNamespace(ahead=lambda _: None)
-    )
+    channel: Any = SimpleNamespace(state=state, in_air=True, flight=None, ahead=lambda: None, led_ahead=lambda: None)
     desk = Desk(other(10.0))
     nearness = Nearness({1: ("Bee", channel)}, elsewhere=desk.it.flown, now_mono_s=lambda: desk.now_s)
     asyncio.run(nearness.look())

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from mapping.geometry.frames import moved_deg, offset_m
 from server.flying.apart.nearness import AHEAD_S, NEAR_M, RADIUS_M, Flown
 from server.flying.apart.way_apart import NEARER_M, Apart, way_apart
+from server.heard.led_way import led_ahead
 from server.heard.plan_follower import Ahead
 from telemetry.topics.vehicle import VehicleState
 
@@ -32,7 +33,7 @@ def way(*east_north_m: tuple[float, float], others: list[Flown], state: VehicleS
     """Level, at 3 m/s, from its first place on."""
     line_m = np.array(east_north_m)
     t_s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line_m, axis=0), axis=1))]) / SPEED_M_S
-    places = [(*moved_deg(HOME, *place), UP_M) for place in east_north_m]
+    places = tuple((*moved_deg(HOME, *place), UP_M) for place in east_north_m)
     return way_apart(state or at(*east_north_m[0]), places, t_s, others, NOW_S)
 
 
@@ -46,7 +47,7 @@ def test_a_way_to_where_another_one_hovers_is_refused_however_long_it_takes() ->
         apart = way((0.0, 0.0), (far_m, 0.0), others=[Flown("Bee", at(far_m), None)])
         (reason,) = apart.reasons
         assert reason.code == "others"
-        assert reason.text.startswith("It may come within 0 m of Bee in ")
+        assert reason.text.startswith("It may come within 0 m of Bee in about ")
         assert "lead Bee away or land it first" in reason.mend
     assert way((0.0, 0.0), (30.0, 0.0), others=[Flown("Bee", at(30.0, up_m=60.0), None)]) == Apart()
     assert way((0.0, 0.0), (30.0, 0.0), others=[Flown("Bee", at(30.0, 30.0), None)]) == Apart()
@@ -57,29 +58,68 @@ def test_one_whose_height_is_not_known_is_as_high() -> None:
     assert way((0.0, 0.0), (30.0, 0.0), others=[Flown("Bee", high, None)]).reasons
 
 
-def test_who_crosses_by_his_plan_is_met_or_not_by_the_times_of_both() -> None:
+def test_who_crosses_by_his_plan_is_met_or_not_by_the_times_of_both_at_the_worse_end() -> None:
     crosses = at(60.0, -60.0, v_north_m_s=SPEED_M_S)
-    meets = Flown("Bee", crosses, ahead((60.0, 0.0, 20.0), (60.0, 60.0, 40.0)))
-    waits = Flown("Bee", crosses, ahead((60.0, -60.0, 300.0), (60.0, 60.0, 340.0)))
-    assert way((0.0, 0.0), (120.0, 0.0), others=[meets]).reasons
-    assert way((0.0, 0.0), (120.0, 0.0), others=[waits]) == Apart()
+
+    def plan(after_s: float) -> Flown:
+        ends = (60.0, -60.0, after_s - 12.0), (60.0, 60.0, after_s + 28.0)
+        return Flown("Bee", replace(crosses, v_north_m_s=0.0), ahead((60.0, -60.0, 0.0), *ends))
+
+    # 60 m at 3 m/s: 20 s by length and speed, 8 s at the soonest and 70 s at the latest as it is led.
+    for after_s in (20.0, 40.0, 65.0):
+        assert way((0.0, 0.0), (120.0, 0.0), others=[plan(after_s)]).reasons, after_s
+    assert way((0.0, 0.0), (120.0, 0.0), others=[plan(400.0)]) == Apart()
     # It holds where it ends: on the other one's line, not for ever.
-    comes = Flown("Bee", crosses, ahead((60.0, -60.0, AHEAD_S), (60.0, 60.0, AHEAD_S + 40.0)))
-    assert way((0.0, 0.0), (60.0, 0.0), others=[comes]).reasons
+    assert way((0.0, 0.0), (60.0, 0.0), others=[plan(70.0 + AHEAD_S - 15.0)]).reasons
+    assert way((0.0, 0.0), (60.0, 0.0), others=[plan(400.0)]) == Apart()
 
 
-def test_who_begins_too_near_may_leave_and_comes_no_nearer() -> None:
+def test_who_begins_too_near_may_part_and_come_back_no_more() -> None:
     near = [Flown("Bee", at(8.0), None)]
-    assert way((0.0, 0.0), (-40.0, 0.0), others=near) == Apart()
+    parts = way((0.0, 0.0), (-40.0, 0.0), others=near)
+    assert parts.reasons == ()
+    assert parts.notes == ("It begins within 2 m of Bee, and leads apart from it.",)
     assert way((0.0, 0.0), (-3.0, 0.0), (40.0, 0.0), others=near).reasons
     assert way((0.0, 0.0), (NEARER_M + 1.0, 0.0), others=near).reasons
+    assert way((0.0, 0.0), (-60.0, 0.0), (-60.0, 30.0), (16.0, 30.0), (16.0, 0.0), others=near).reasons
+    # Nobody knows that it is not as high: to go down past it is not to part from it.
+    unknown = [Flown("Bravo's Bee", replace(at(1.0), alt_amsl_m=None), None, key="Bravo/1")]
+    places = [(*HOME, 60.0), (*HOME, 10.0)]
+    down = way_apart(at(0.0, up_m=60.0), tuple(places), np.array([0.0, 25.0]), unknown, NOW_S)
+    assert "call the other station" in down.notes[0]
+
+
+def test_one_that_is_silent_or_tells_no_place_is_named() -> None:
+    silent = Flown("Bee", replace(at(900.0), position_t_mono_s=NOW_S - 120.0), None)
+    assert "last heard 120 s ago" in way((0.0, 0.0), (30.0, 0.0), others=[silent]).notes[0]
+    there = Flown("Bee", replace(at(30.0), position_t_mono_s=NOW_S - 120.0), None)
+    (reason,) = way((0.0, 0.0), (30.0, 0.0), others=[there]).reasons
+    assert "last heard there 120 s ago" in reason.mend
+    nowhere = Flown("Bee", replace(at(900.0), lat_deg=None, lon_deg=None), None)
+    apart = way((0.0, 0.0), (30.0, 0.0), others=[nowhere])
+    assert apart.notes == ("Bee is in the air, and does not tell where.",)
+    assert apart.noted == {"Bee"}
+
+
+def test_one_that_is_led_counts_along_its_way_and_where_it_is() -> None:
+    led = led_ahead(np.array([(*moved_deg(HOME, 60.0, 0.0), UP_M)]), np.array([20.0]))
+    comes = Flown("Bee", at(60.0, -60.0), None, told=Flown("Bee", at(60.0, -60.0), led))
+    assert way((0.0, 0.0), (60.0, 0.0), others=[comes]).reasons
+    assert way((0.0, 0.0), (60.0, -60.0), others=[comes]).reasons
+    assert way((0.0, 0.0), (-60.0, 0.0), others=[comes]) == Apart()
+
+
+def test_where_no_height_of_home_tells_how_high_a_plan_is_it_is_as_high() -> None:
+    ends = ahead((60.0, -60.0, 0.0), (60.0, 0.0, 20.0))
+    comes = Flown("Bee", replace(at(60.0, -60.0), home_alt_amsl_m=None), ends)
+    assert way((0.0, 0.0), (60.0, 0.0), others=[comes]).reasons
 
 
 def test_what_nobody_here_can_hold_is_said_and_refuses_nothing() -> None:
     there = Flown("Bravo's Bee", at(30.0), None, key="Bravo/1")
     apart = way((0.0, 0.0), (30.0, 0.0), others=[there])
     assert apart.reasons == ()
-    assert apart.notes[0].startswith("It may come within 0 m of Bravo's Bee in ")
+    assert apart.notes[0].startswith("It may come within 0 m of Bravo's Bee in about ")
     assert "call the other station" in apart.notes[0]
     silent = Flown("Bravo's Bee", at(900.0), None, is_silent=True, key="Bravo/1")
     assert "not heard any more" in way((0.0, 0.0), (30.0, 0.0), others=[silent]).notes[0]
@@ -109,9 +149,9 @@ def test_no_way_that_is_let_through_passes_a_standing_one_too_near(
 
 
 @pytest.mark.parametrize("lat_deg", [None, HOME[0]])
-def test_from_the_ground_it_begins_at_its_first_place(lat_deg: float | None) -> None:
-    stands = replace(at(0.0, up_m=0.0), armed=False, landed="on_ground", lat_deg=lat_deg)
-    places = [(*HOME, 0.0), (*HOME, UP_M)]
-    hovers = [Flown("Bee", at(6.0), None)]
-    assert way_apart(stands, places, np.array([0.0, 8.0]), hovers, NOW_S).reasons
-    assert way_apart(stands, places, np.array([0.0, 8.0]), [Flown("Bee", at(40.0), None)], NOW_S) == Apart()
+def test_from_the_ground_it_begins_where_it_stands(lat_deg: float | None) -> None:
+    """It takes its home there: what it told as home before is of no matter."""
+    stands = replace(at(0.0, up_m=12.0), armed=False, landed="on_ground", lat_deg=lat_deg)
+    places, t_s = ((*HOME, 0.0), (*HOME, UP_M)), np.array([0.0, 8.0])
+    assert way_apart(stands, places, t_s, [Flown("Bee", at(6.0, up_m=12.0 + UP_M), None)], NOW_S).reasons
+    assert way_apart(stands, places, t_s, [Flown("Bee", at(40.0), None)], NOW_S) == Apart()

@@ -18,6 +18,7 @@ WAY = "/api/flight/way"
 JUDGED_WITHIN_S, ORDERED_WITHIN_S = 180.0, START_S + 15.0
 """A large model on a slow computer; the link's own time for a start over a bad link, and the way there."""
 MAY_FLY = "It may be flown: look at the console."
+_VERDICTS = {None: "CERTIFIED", "others": "VEHICLE IN THE WAY"}
 WATCH = "The station flies it: watch it in the console, where Hold stands."
 
 
@@ -83,7 +84,7 @@ def _lines(way: WayDoc, *, ordered: bool) -> list[str]:
     kept = "nothing is near" if way.clearance_m is None else f"at least {way.clearance_m:.1f} m from the surface"
     by = "the model with what sensors have seen" if way.has_seen else "the model alone"
     figures = f"{way.length_m:.0f} m, about {way.seconds:.0f} s; {kept}, required {way.required_m:.1f} m, by {by}"
-    lines = [f"{'CERTIFIED' if way.problem is None else 'NOT CERTIFIED'}: {figures}"]
+    lines = [f"{_VERDICTS.get(way.problem, 'NOT CERTIFIED')}: {figures}"]
     lines += [f"  - {reason.text} {reason.mend}".rstrip() for reason in way.reasons]
     lines += [f"  {note}" for note in way.notes]
     return [*lines, f"ORDERED. {WATCH}" if ordered else "NOT FLOWN"]

@@ -8,7 +8,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
@@ -31,8 +31,6 @@ AHEAD_S, STRAIGHT_S = 60.0, 12.0
 """So far a plan is looked ahead; and straight on, where none is flown."""
 STANDS_M_S = 0.3
 """What is slower stays where it is for all of that time."""
-EARLY_LATE_S, EARLY_LATE_SHARE = 2.0, 0.1
-"""Of a plan's predicted times."""
 VEER_SHARE = 0.2
 """Of its speed: so much a vehicle's ball grows in a second while nothing is heard, or where no plan is flown."""
 _FLAT = 1.02
@@ -55,7 +53,8 @@ class Flown:
     key: str = ""
     """Of another station: its name and the vehicle's number there. What its vehicle is called may be anything."""
     told: Flown | None = None
-    """Of another station: the same vehicle on the line that it is told to fly. Held apart as well, never instead."""
+    """The same vehicle on the line that another station tells of, or on the guided way that it is led. Held apart as
+    well, never instead."""
 
 
 Pair = tuple[int, int | str]
@@ -107,10 +106,15 @@ class Nearness:
 def in_the_air(channels: Mapping[int, tuple[str, Channel]]) -> dict[int, Flown]:
     """One's own, by their numbers: those whose place is known."""
     return {
-        number: Flown(name, channel.state, channel.ahead())
+        number: flown_of(name, channel)
         for number, (name, channel) in channels.items()
         if channel.state is not None and channel.in_air and channel.state.lat_deg is not None
     }
+
+
+def flown_of(name: str, channel: Channel) -> Flown:
+    state, led = channel.state or VehicleState(0, 0), channel.led_ahead()
+    return Flown(name, state, channel.ahead(), told=None if led is None else Flown(name, state, led))
 
 
 def _near(found: Mapping[Pair, Nearest], before: Mapping[Pair, Nearest]) -> dict[Pair, Nearest]:
@@ -168,7 +172,7 @@ def found_elsewhere(flown: Mapping[int, Flown], now_s: float, others: Mapping[st
     reach_m = {key: max(_reach_m(each, now_s) for each in both_ways(of)) for key, of in others.items()}
     found: dict[Pair, Nearest] = {}
     for one, own in flown.items():
-        own_m = _reach_m(own, now_s)
+        own_m = max(_reach_m(each, now_s) for each in both_ways(own))
         for (key, other), far_m in zip(others.items(), _apart_m(own, list(others.values())), strict=True):
             if far_m > _FLAT * (own_m + reach_m[key]) + OVER_M:
                 continue
@@ -198,15 +202,17 @@ def _reach_m(of: Flown, now_s: float) -> float:
 
 
 def _radius_m(of: Flown) -> float:
-    return max(RADIUS_M, 2.0 * (of.state.horizontal_accuracy_m or 0.0)) + of.unsure_m
+    off_m = 0.0 if of.ahead is None else of.ahead.off_m
+    return max(RADIUS_M, 2.0 * (of.state.horizontal_accuracy_m or 0.0)) + of.unsure_m + off_m
 
 
 def near_each_other(one: Flown, other: Flown, now_s: float) -> Nearest | None:
     """Where either one's height above the sea is unknown, both are taken to be at the same height.
 
-    Of another station's both ways count: straight on, and the line that is told; the nearer, then the sooner is it.
+    Where a line is told, both ways count: straight on, and that; the nearer, then the sooner is it.
     """
-    found = [at for way in both_ways(other) if (at := _near_on(one, way, now_s)) is not None]
+    pairs = product(both_ways(one), both_ways(other))
+    found = [at for its, theirs in pairs if (at := _near_on(its, theirs, now_s)) is not None]
     return min(found, key=lambda at: (at.distance_m, at.t_s), default=None)
 
 
@@ -247,8 +253,8 @@ def line_of(
         return TimedLine(
             *((points_m, t_s) if ahead_s is None else _until(points_m, t_s, now_s + ahead_s)),
             radius_m,
-            early_late_s=EARLY_LATE_S,
-            early_late_share=EARLY_LATE_SHARE,
+            early_late_s=ahead.early_late_s,
+            early_late_share=ahead.early_late_share,
         )
     speed_m_s = math.hypot(*v_enu_m_s)
     ends_s = now_s + ((ahead_s or AHEAD_S) if speed_m_s < STANDS_M_S else STRAIGHT_S) - heard_s

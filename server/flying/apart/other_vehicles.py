@@ -22,15 +22,15 @@ from mapping.geometry.frames import moved_deg, offset_m
 from planning.following.separation import Nearest, TimedLine, nearest, ways_apart
 from server.errors import reported
 from server.flying.apart.nearness import (
-    EARLY_LATE_S,
-    EARLY_LATE_SHARE,
     NEAR_M,
     RADIUS_M,
     Flown,
+    both_ways,
+    flown_of,
     line_of,
 )
 from server.heard.channel import Channel
-from server.heard.plan_follower import Whole
+from server.heard.plan_follower import EARLY_LATE_S, EARLY_LATE_SHARE, Whole
 from server.schemas import CheckRow
 from telemetry.topics.vehicle import VehicleState
 
@@ -60,7 +60,7 @@ class Other:
     flown: Flown
     flies: bool
     on_board: Whole | None
-    """Verified, and known here; None, too, while it is led along another way."""
+    """Verified, and known here."""
     waits_in_air: bool = False
     """It holds, and what is on board was taken up and is not flown yet."""
 
@@ -85,9 +85,8 @@ class _Met:
 
 
 def known(name: str, channel: Channel, *, is_verified: bool, waits_in_air: bool = False) -> Other:
-    flown = Flown(name, channel.state or VehicleState(0, 0), channel.ahead())
-    follows = is_verified and not (channel.in_air and channel.is_led_apart and not waits_in_air)
-    return Other(flown, channel.in_air, channel.follower.whole() if follows else None, waits_in_air)
+    whole = channel.follower.whole() if is_verified else None
+    return Other(flown_of(name, channel), channel.in_air, whole, waits_in_air)
 
 
 class OtherVehicles:
@@ -255,9 +254,10 @@ def _against(who: Other, mine: Whole, other: Other, now_s: float) -> CheckRow | 
         text = f"{name} has a mission on board that comes within {met.distance_m:.0f} m of this one,"
         return _row("accept", f"{text} at {_place(origin_deg, met)}.", "Fly one after the other, or plan them apart.")
     if other.flown.ahead is None or other.on_board is None or theirs.lat_deg is None:
-        here = None if theirs.lat_deg is None else line_of(other.flown, origin_deg, now_s, flat=flat, ahead_s=HORIZON_S)
-        met = None if here is None else _first([(one, here) for one in _timed(mine, way_m, now_s)], now_s)
-        if met is not None:
+        met = (
+            None if theirs.lat_deg is None else _meets_unplanned(mine, way_m, other.flown, origin_deg, now_s, flat=flat)
+        )
+        if met is not None and not _is_only_there(who, other.flown, now_s):
             return _too_near(who, name, met, origin_deg, now_s)
         text = f"{name} is in the air, and no plan tells where it will be."
         return _row("accept", text, "Agree with whoever flies it.")
@@ -272,6 +272,27 @@ def _against(who: Other, mine: Whole, other: Other, now_s: float) -> CheckRow | 
         text = f"Its line comes near that of {name}, but by the predicted times not while {name} is there."
         return _row("accept", text, f"{begin} now or once {name} has landed, and watch both.")
     return _too_near(who, name, met, origin_deg, now_s)
+
+
+def _meets_unplanned(
+    mine: Whole, way_m: F64, other: Flown, origin_deg: tuple[float, float], now_s: float, *, flat: bool
+) -> Nearest | None:
+    """One that hovers, or is led along a way of its own: for as long as ``HORIZON_S``."""
+    theirs = [line_of(each, origin_deg, now_s, flat=flat, ahead_s=HORIZON_S) for each in both_ways(other)]
+    return _first([(one, line) for one in _timed(mine, way_m, now_s) for line in theirs], now_s)
+
+
+def _is_only_there(who: Other, other: Flown, now_s: float) -> bool:
+    """It was last heard there, long ago; or this one holds that near to it, and may be led away."""
+    heard_s, mine = other.state.position_t_mono_s, who.flown.state
+    if heard_s is not None and now_s - heard_s > OLD_S:
+        return True
+    if not who.waits_in_air or mine.lat_deg is None or mine.lon_deg is None:
+        return False
+    here_deg = mine.lat_deg, mine.lon_deg
+    flat_m = math.hypot(*offset_m(here_deg, other.state.lat_deg or 0.0, other.state.lon_deg or 0.0))
+    up_m = (mine.alt_amsl_m or 0.0) - (other.state.alt_amsl_m or 0.0)
+    return math.hypot(flat_m, up_m) < NEAR_M + 2.0 * RADIUS_M
 
 
 def _first(pairs: Sequence[tuple[TimedLine, TimedLine]], now_s: float) -> Nearest | None:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import math
-import secrets
 import time
 from dataclasses import dataclass, replace
 
 from mapping.geometry.frames import apart_m
-from planning.guided.guided_model import RETURNS
 from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotFoundError, NotReadyError
 from server.flying.apart.way_apart import Apart, Others, way_apart
+from server.flying.in_flight.judged_way import looked_along, required_m, to_its_end, way_doc
 from server.flying.in_flight.way_task import WayAsked, WayJudged, judge_way
 from server.heard.channel import Channel, ShownWay
 from server.heard.led_way import LedWay
@@ -23,7 +21,6 @@ from server.obstacles.surroundings import (
     is_more_seen_near,
     is_same_seen,
     maps_revision,
-    returns_from,
     seen_before_near,
     seen_maps,
 )
@@ -33,7 +30,6 @@ from server.schemas import (
     GuidedMessage,
     GuidedState,
     Pages,
-    ReasonDoc,
     TerrainDoc,
     WayBody,
     WayDoc,
@@ -44,7 +40,7 @@ from server.work.jobs import Lane
 from server.workspace import Workspace
 from telemetry.bus.link_client import LinkClient
 from telemetry.errors import NoVehicleError
-from telemetry.flight.certified_way import way_notes, way_request
+from telemetry.flight.certified_way import way_request
 from telemetry.flight.guided.beginning import why_moves
 from telemetry.flight.home_watch import HomePlace, home_of, home_of_takeoff, is_there
 from telemetry.flight.preflight.parameters import NAMES
@@ -70,6 +66,7 @@ class _InHand:
     """From which its heights count."""
     maps: tuple[Voxels, ...]
     """That it was judged by."""
+    apart: Apart
     flies_since_utc_s: float | None = None
 
 
@@ -113,11 +110,11 @@ class WayDesk:
             asked = await self.asked(operator, body)
             judged: WayJudged = await self._lane.call(judge_way, asked)
             home = home_of(asked.state)
-            notes = await self.seen_before(asked.maps, _looked_along(judged, home), _required_m(judged))
+            notes = await self.seen_before(asked.maps, looked_along(judged, home), required_m(judged))
             self._check_still(vehicle, flown)
             apart = await self._apart(judged, others)
-            doc = _doc(judged, body, terrain, notes, apart)
-            self._in_hand = _InHand(doc, judged, time.monotonic(), home, asked.maps)
+            doc = way_doc(judged, body, terrain, notes, apart)
+            self._in_hand = _InHand(doc, judged, time.monotonic(), home, asked.maps, apart)
         finally:
             self._is_judging = False
             self._tell()
@@ -148,16 +145,22 @@ class WayDesk:
             what += "." if first is None else f": {first.text}"
             raise NotCertifiedError(what, advice="" if first is None else first.mend)
         await self._check_seen(in_hand)
-        await self._check_apart(in_hand, others)
         self._check_home(in_hand)
         since_utc_s = time.time()
         speed_m_s, most_m_s = judged.speed_m_s, judged.most_m_s
         request = way_request(operator, judged.way, judged.wish, in_hand.home, speed_m_s=speed_m_s, most_m_s=most_m_s)
-        await self._link.call(request)
+        before = self._live.led
+        # Before others are looked at: of two that are ordered at the same moment at least one sees the other's.
+        self._live.led = LedWay(*to_its_end(judged), judged.speed_m_s, since_utc_s)
+        try:
+            await self._check_apart(in_hand, others)
+            await self._link.call(request)
+        except BaseException:
+            self._live.led = before
+            raise
         if self._in_hand is in_hand:
             doc = doc.model_copy(update={"flies": True})
             self._in_hand = replace(in_hand, doc=doc, flies_since_utc_s=since_utc_s)
-            self._live.led = LedWay(judged.way.places, judged.way.t_s)
             self._tell()
 
     async def set_speed(self, operator: Operator, body: WaySpeedBody) -> None:
@@ -165,7 +168,7 @@ class WayDesk:
         await self._link.call(SetSpeed(operator, body.speed_m_s))
         if (in_hand := self._in_hand) is not None and in_hand.doc.flies:
             if self._live.led is not None:
-                self._live.led.slowed(in_hand.doc.speed_m_s / body.speed_m_s)
+                self._live.led.at_speed(body.speed_m_s)
             doc = in_hand.doc.model_copy(update={"speed_m_s": body.speed_m_s})
             self._in_hand = replace(in_hand, doc=doc)
             self._tell()
@@ -179,19 +182,29 @@ class WayDesk:
 
     def on_flight(self, flight: FlightStatus) -> None:
         """What is over is put away."""
+        self._end_led(flight)
         since_utc_s = None if self._in_hand is None else self._in_hand.flies_since_utc_s
         if since_utc_s is None or flight.since_utc_s is None or flight.since_utc_s < since_utc_s:
             return
-        if flight.is_flown or flight.way != "guided" or flight.phase in ("idle", "landed", "interrupted"):
+        if _is_over(flight):
             self._in_hand = None
             self._tell()
+
+    def _end_led(self, flight: FlightStatus) -> None:
+        """A way that is held stays where it may fly, whatever was judged since: it may be gone on with."""
+        led = self._live.led
+        if led is None or flight.since_utc_s is None or flight.since_utc_s < led.since_utc_s:
+            return
+        led.is_new = False
+        if _is_over(flight):
+            self._live.led = None
 
     def on_link(self, vehicle: str | None) -> None:
         """Id of the adopted one. What was judged for another is not this one's; what is flown goes on where the vehicle
         is heard from elsewhere."""
         if vehicle == self._adopted:
             return
-        self._adopted = vehicle
+        self._adopted, self._live.led = vehicle, None if vehicle is None else self._live.led
         if self._in_hand is not None and (vehicle is None or not self._in_hand.doc.flies):
             self._in_hand = None
             self._tell()
@@ -266,8 +279,8 @@ class WayDesk:
     async def _check_seen(self, in_hand: _InHand) -> None:
         """Raises CheckNeededError where sensors have seen more near the way, or near a return from anywhere on it that
         is certified with it, since it was judged; NotReadyError where nobody knows."""
-        line_deg = _looked_along(in_hand.judged, in_hand.home)
-        sees_more = await self.has_seen_more_near(in_hand.maps, line_deg, _required_m(in_hand.judged))
+        line_deg = looked_along(in_hand.judged, in_hand.home)
+        sees_more = await self.has_seen_more_near(in_hand.maps, line_deg, required_m(in_hand.judged))
         if self._in_hand is not in_hand:
             raise NotFoundError(NOWHERE, advice="Ask for the way again.")
         if sees_more:
@@ -276,18 +289,19 @@ class WayDesk:
 
     async def _apart(self, judged: WayJudged, others: Others) -> Apart:
         """By where all are now."""
-        way = judged.way
-        return await asyncio.to_thread(
-            way_apart, self._vehicle(), way.places, way.t_s, tuple(others()), time.monotonic()
-        )
+        places, t_s = to_its_end(judged)
+        return await asyncio.to_thread(way_apart, self._vehicle(), places, t_s, tuple(others()), time.monotonic())
 
     async def _check_apart(self, in_hand: _InHand, others: Others) -> None:
-        """Raises CheckNeededError where it would lead near another vehicle of the station's by now."""
-        reasons = (await self._apart(in_hand.judged, others)).reasons
+        """Raises CheckNeededError where it would lead near another vehicle by now of which the card says nothing."""
+        apart = await self._apart(in_hand.judged, others)
         if self._in_hand is not in_hand:
             raise NotFoundError(NOWHERE, advice="Ask for the way again.")
-        if reasons:
-            raise CheckNeededError(reasons[0].text, advice=reasons[0].mend)
+        if apart.reasons:
+            raise CheckNeededError(apart.reasons[0].text, advice=apart.reasons[0].mend)
+        if new := apart.noted - in_hand.apart.noted:
+            what = f"Since the way was judged {' and '.join(sorted(new))} came to where it leads, or may have."
+            raise CheckNeededError(what, advice="Ask for the way again.")
 
     def _check_home(self, in_hand: _InHand) -> None:
         """Raises CheckNeededError where home was moved since: the way's places would be elsewhere. A vehicle on the
@@ -327,45 +341,12 @@ class WayDesk:
 
     def _tell(self) -> None:
         in_hand = self._in_hand
-        if in_hand is None or not in_hand.doc.flies:
-            self._live.led = None
         self._live.way = None if in_hand is None else ShownWay(in_hand.judged.way.places, in_hand.doc.problem is None)
         self._pages.publish(GuidedMessage(guided=self.state))
 
 
-def _required_m(judged: WayJudged) -> float:
-    return judged.way.certificate.required_clearance_m
-
-
-def _looked_along(judged: WayJudged, home: HomePlace | None) -> list[tuple[float, float]]:
-    """(lat_deg, lon_deg) along the way, and along each return from anywhere on it that is certified with it."""
-    places = [place[:2] for place in judged.way.places]
-    ends = [] if home is None else [(home.lat_deg, home.lon_deg)]
-    if judged.way.problem is None and not isinstance(judged.wish, RETURNS):
-        return returns_from(places, [*ends, *judged.rally_deg], _required_m(judged))
-    return [*places, *ends]
-
-
-def _doc(judged: WayJudged, body: WayBody, terrain: TerrainDoc, notes: list[str], apart: Apart) -> WayDoc:
-    way = judged.way
-    problem = way.problem if way.problem == "way" or not apart.reasons else "others"
-    reasons = [ReasonDoc(code=reason.code, text=reason.text, mend=reason.mend) for reason in way.certificate.reasons]
-    return WayDoc(
-        id=secrets.token_hex(8),
-        action=body.action,
-        problem=problem,
-        notes=[*way_notes(way), *notes, *apart.notes],
-        reasons=[*apart.reasons, *reasons] if problem == "others" else [*reasons, *apart.reasons],
-        clearance_m=way.clearance_m if math.isfinite(way.clearance_m) else None,
-        required_m=way.certificate.required_clearance_m,
-        length_m=way.length_m,
-        seconds=way.seconds,
-        lands=isinstance(judged.wish, RETURNS),
-        speed_m_s=judged.speed_m_s,
-        most_m_s=judged.most_m_s,
-        terrain_name=terrain.name,
-        has_seen=judged.has_seen,
-    )
+def _is_over(flight: FlightStatus) -> bool:
+    return flight.is_flown or flight.way != "guided" or flight.phase in ("idle", "landed", "interrupted")
 
 
 def flown_places(states: list[VehicleState]) -> tuple[tuple[float, float, float], ...]:
