@@ -75,19 +75,31 @@ def test_a_way_near_which_more_is_seen_since_it_was_judged_is_not_flown(
         line = [made.home, made.home]
         assert not is_more_seen_near(seen, seen, line, 1000.0)
         assert is_more_seen_near((), seen, line, 1000.0)
-        radar.fold(delta([(16, 1, 34)], since=3, revision=4, **told))
-        with pytest.raises(CheckNeededError, match="seen more near the way") as refused:
+        assert bench.live.way is not None
+        top = int(bench.live.way.places[-1][2])
+        wall = [(15, 0, z) for z in range(top + 2)]
+        radar.fold(delta(wall, since=3, revision=4, **told))
+        with pytest.raises(CheckNeededError, match="seen more near the way since it was judged, and it is") as refused:
             await bench.fly(FlyWayBody(id=way.id))
-        assert refused.value.advice == "Ask for the way again."
-        radar.fold(delta([(16, 1, 34)], 20, since=4, revision=5, **told))
+        assert refused.value.advice == "Look at it as it is now, then fly it."
+        assert bench.desk.state.way is not None
+        assert bench.desk.state.way.id != way.id, "what it is now is in hand, and was looked at by nobody"
+        radar.fold(delta(wall, 20, since=4, revision=5, **told))
+        way = await bench.judged(action="to", place=bench.beside(30.0, 0.0), height_m=20.0)
         monkeypatch.setattr(way_desk, "SEEN_WITHIN_S", 0.0)
         radar.fold(delta(old, whole=True, revision=6, parts=2, **told))
         with pytest.raises(NotReadyError, match="Parts of the radar map"):
             await bench.fly(FlyWayBody(id=way.id))
         assert bench.vehicle.told == []
         radar.fold(delta([], whole=True, revision=6, part=1, parts=2, **told))
+        # A wrong match changes nothing of the way: it is judged anew, and flown.
+        radar.fold(delta([(15, 20, 20)], since=6, revision=7, **told))
+        judged = sum(state.is_judging for state in bench.told)
         await bench.fly(FlyWayBody(id=way.id))
         assert isinstance(bench.vehicle.told[-1], FlyWay)
+        assert sum(state.is_judging for state in bench.told) > judged
+        assert bench.desk.state.way is not None
+        assert (bench.desk.state.way.id, bench.desk.state.way.flies) == (way.id, True)
 
     runner.run(scenario())
 
@@ -105,12 +117,12 @@ def test_a_way_is_not_flown_where_more_is_seen_near_a_return_to_a_rally_point_fr
         radar.fold(delta([(0, 64, 1)], since=1, revision=2, **told))
         in_hand = bench.desk._in_hand
         assert in_hand is not None
-        await bench.desk._check_seen(in_hand)
+        assert not await bench.desk._sees_more(in_hand)
         radar.fold(delta([(0, 64, 1)], 20, since=2, revision=3, **told))
         bench.vehicle.places["rally"] = made.rally(north_m=80.0)
         ways.append(await bench.judged(action="to", place=bench.beside(30.0, 0.0), height_m=20.0))
         assert [way.problem for way in ways] == [None, None], ways[-1].reasons
-        radar.fold(delta([(0, 64, 1)], since=3, revision=4, **told))
+        radar.fold(delta([(0, 64, z) for z in range(60)], since=3, revision=4, **told))
         with pytest.raises(CheckNeededError, match="seen more near the way"):
             await bench.fly(FlyWayBody(id=ways[-1].id))
         assert bench.vehicle.told == []
@@ -175,10 +187,12 @@ def test_who_walks_about_beside_a_take_off_is_no_matter_unless_he_is_near_it(
         origin, radar = MapOrigin(*made.home, bench.live.state.home_alt_amsl_m or 0.0), bench.watch.mirrors["radar"]
         way = await bench.judged(action="take_off", height_m=10.0)
         assert way.problem is None, way.reasons
-        radar.fold(delta([(1, 1, 0)], whole=True, origin=origin))
+        radar.fold(delta([(1, 1, z) for z in range(12)], whole=True, origin=origin))
         with pytest.raises(CheckNeededError, match="seen more near the way"):
             await bench.fly(FlyWayBody(id=way.id))
-        radar.fold(delta([(12, 8, 0), (12, 8, 1)], whole=True, revision=2, origin=origin))
+        radar.fold(delta([], whole=True, revision=2, origin=origin))
+        way = await bench.judged(action="take_off", height_m=10.0)
+        radar.fold(delta([(12, 8, 0), (12, 8, 1)], whole=True, revision=3, origin=origin))
         await bench.fly(FlyWayBody(id=way.id))
         assert bench.vehicle.told
 

@@ -15,8 +15,10 @@ from server.schemas import GuidedState, WayBody, WayDoc
 from telemetry.bus.link_client import START_S
 
 WAY = "/api/flight/way"
-JUDGED_WITHIN_S, ORDERED_WITHIN_S = 180.0, START_S + 15.0
-"""A large model on a slow computer; the link's own time for a start over a bad link, and the way there."""
+JUDGED_WITHIN_S = 180.0
+"""A large model on a slow computer."""
+ORDERED_WITHIN_S = JUDGED_WITHIN_S + START_S + 15.0
+"""The link's own time for a start over a bad link, and the way there; it may be judged once more before."""
 MAY_FLY = "It may be flown: look at the console."
 _VERDICTS = {None: "CERTIFIED", "others": "VEHICLE IN THE WAY"}
 WATCH = "The station flies it: watch it in the console, where Hold stands."

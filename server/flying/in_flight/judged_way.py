@@ -8,7 +8,8 @@ import secrets
 import numpy as np
 
 from mapping.geometry.arrays import F64
-from planning.guided.guided_model import RETURNS, Rally
+from mapping.geometry.frames import offset_m
+from planning.guided.guided_model import RETURNS, GuidedWay, Rally
 from server.flying.apart.way_apart import Apart
 from server.flying.in_flight.way_task import WayJudged
 from server.heard.led_way import Places
@@ -17,6 +18,8 @@ from server.schemas import ReasonDoc, TerrainDoc, WayBody, WayDoc
 from telemetry.flight.certified_way import way_notes
 from telemetry.flight.home_watch import HomePlace
 
+WANDERED_M = 1.0
+"""By so much a vehicle that hovers may be elsewhere when it is asked again."""
 DOWN_M_S = 2.5
 """No landing here is faster."""
 
@@ -65,3 +68,14 @@ def to_its_end(judged: WayJudged) -> tuple[Places, F64]:
     ground_m = up_m - wish.height_m - way.raised_m if isinstance(wish, Rally) else 0.0
     down_s = max(0.0, up_m - ground_m) / DOWN_M_S
     return (*way.places, (lat_deg, lon_deg, min(up_m, ground_m))), np.append(way.t_s, way.t_s[-1] + down_s)
+
+
+def is_same_way(one: GuidedWay, other: GuidedWay) -> bool:
+    """Place by place, but for what the vehicle wandered since."""
+    a, b = np.array(one.places), np.array(other.places)
+    if a.shape != b.shape:
+        return False
+    east_m, north_m = offset_m((float(a[0, 0]), float(a[0, 1])), a[:, 0], a[:, 1])
+    other_east_m, other_north_m = offset_m((float(a[0, 0]), float(a[0, 1])), b[:, 0], b[:, 1])
+    off_m = np.sqrt((east_m - other_east_m) ** 2 + (north_m - other_north_m) ** 2 + (a[:, 2] - b[:, 2]) ** 2)
+    return bool((off_m <= WANDERED_M).all())

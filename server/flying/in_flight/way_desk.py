@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from mapping.geometry.frames import apart_m
 from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotFoundError, NotReadyError
 from server.flying.apart.way_apart import Apart, Others, way_apart
-from server.flying.in_flight.judged_way import looked_along, required_m, to_its_end, way_doc
+from server.flying.in_flight.judged_way import is_same_way, looked_along, required_m, to_its_end, way_doc
 from server.flying.in_flight.way_task import WayAsked, WayJudged, judge_way
 from server.heard.channel import Channel, ShownWay
 from server.heard.led_way import LedWay
@@ -54,6 +54,8 @@ SEEN_WITHIN_S = 1.0
 """A way that is to be flown now waits no longer for a map that is just being told."""
 TAKE_OFF_M = 1.0
 """A climb that strays no farther to the side is the take-off."""
+SEEN_AGO_S = 10.0
+"""What a way is judged by once more when it is ordered is no older when it is flown."""
 NOWHERE = "Nothing is judged any more, or another way was judged meanwhile."
 
 
@@ -64,8 +66,8 @@ class _InHand:
     judged_mono_s: float
     home: HomePlace | None
     """From which its heights count."""
-    maps: tuple[Voxels, ...]
-    """That it was judged by."""
+    asked: WayAsked
+    """What it was judged by."""
     apart: Apart
     flies_since_utc_s: float | None = None
 
@@ -109,16 +111,19 @@ class WayDesk:
         try:
             asked = await self.asked(operator, body)
             judged: WayJudged = await self._lane.call(judge_way, asked)
-            home = home_of(asked.state)
-            notes = await self.seen_before(asked.maps, looked_along(judged, home), required_m(judged))
+            in_hand = await self._taken(asked, judged, terrain, others)
             self._check_still(vehicle, flown)
-            apart = await self._apart(judged, others)
-            doc = way_doc(judged, body, terrain, notes, apart)
-            self._in_hand = _InHand(doc, judged, time.monotonic(), home, asked.maps, apart)
+            self._in_hand = in_hand
         finally:
             self._is_judging = False
             self._tell()
         return self.state
+
+    async def _taken(self, asked: WayAsked, judged: WayJudged, terrain: TerrainDoc, others: Others) -> _InHand:
+        home = home_of(asked.state)
+        notes = await self.seen_before(asked.maps, looked_along(judged, home), required_m(judged))
+        apart = await self._apart(judged, others)
+        return _InHand(way_doc(judged, asked.body, terrain, notes, apart), judged, time.monotonic(), home, asked, apart)
 
     async def fly(self, operator: Operator, body: FlyWayBody, others: Others) -> None:
         """Raises NotFoundError, NotCertifiedError, CheckNeededError where home was moved, more was seen, or another
@@ -135,7 +140,7 @@ class WayDesk:
         in_hand = self._in_hand
         if in_hand is None or in_hand.doc.id != body.id or in_hand.doc.flies:
             raise NotFoundError(NOWHERE, advice="Ask for the way again.")
-        doc, judged = in_hand.doc, in_hand.judged
+        doc = in_hand.doc
         if time.monotonic() - in_hand.judged_mono_s > CHECK_FRESH_S:
             what = f"The way was judged more than {CHECK_FRESH_S:.0f} s ago: more may have been seen since."
             raise CheckNeededError(what, advice="Ask for the way again.")
@@ -144,9 +149,10 @@ class WayDesk:
             what = "Another vehicle is in the way" if doc.problem == "others" else "The way is not certified"
             what += "." if first is None else f": {first.text}"
             raise NotCertifiedError(what, advice="" if first is None else first.mend)
-        await self._check_seen(in_hand)
         self._check_home(in_hand)
-        since_utc_s = time.time()
+        in_hand = await self._by_what_is_seen_now(in_hand, others, accepts=body.accept_return)
+        self._check_home(in_hand)
+        judged, since_utc_s = in_hand.judged, time.time()
         speed_m_s, most_m_s = judged.speed_m_s, judged.most_m_s
         request = way_request(operator, judged.way, judged.wish, in_hand.home, speed_m_s=speed_m_s, most_m_s=most_m_s)
         before = self._live.led
@@ -159,7 +165,7 @@ class WayDesk:
             self._live.led = before
             raise
         if self._in_hand is in_hand:
-            doc = doc.model_copy(update={"flies": True})
+            doc = in_hand.doc.model_copy(update={"flies": True})
             self._in_hand = replace(in_hand, doc=doc, flies_since_utc_s=since_utc_s)
             self._tell()
 
@@ -276,16 +282,47 @@ class WayDesk:
 
     # How
 
-    async def _check_seen(self, in_hand: _InHand) -> None:
-        """Raises CheckNeededError where sensors have seen more near the way, or near a return from anywhere on it that
-        is certified with it, since it was judged; NotReadyError where nobody knows."""
+    async def _by_what_is_seen_now(self, in_hand: _InHand, others: Others, *, accepts: bool) -> _InHand:
+        """Judged anew where sensors have seen more near the way, or near a return from anywhere on it that is certified
+        with it, since it was judged: wrong matches of a camera come and go with each frame, and do not matter where the
+        way is as it was. Raises CheckNeededError where it is not, with what it is now in hand; NotReadyError where
+        nobody knows what is seen."""
+        if not await self._sees_more(in_hand):
+            return in_hand
+        self._is_judging = True
+        self._tell()
+        try:
+            asked = await self.renewed(in_hand.asked)
+            begun_mono_s = time.monotonic()
+            judged: WayJudged = await self._lane.call(judge_way, asked)
+            now = await self._taken(asked, judged, self._terrain(), others)
+        finally:
+            self._is_judging = False
+            self._tell()
+        self._check_in_hand(in_hand)
+        is_same = is_same_way(judged.way, in_hand.judged.way) and now.doc.problem == in_hand.doc.problem
+        may_fly = now.doc.problem is None or (now.doc.problem == "return" and accepts)
+        self._in_hand = replace(now, doc=now.doc.model_copy(update={"id": in_hand.doc.id}) if is_same else now.doc)
+        self._tell()
+        if not is_same or not may_fly:
+            what = "Sensors have seen more near the way since it was judged, and it is another one now."
+            raise CheckNeededError(what, advice="Look at it as it is now, then fly it.")
+        if time.monotonic() - begun_mono_s > SEEN_AGO_S:
+            what = f"Judging the way by what is seen now took more than {SEEN_AGO_S:.0f} s: more may be there by now."
+            raise CheckNeededError(what, advice="Close what else runs here, then ask for the way again.")
+        return self._in_hand
+
+    async def _sees_more(self, in_hand: _InHand) -> bool:
+        """Raises NotReadyError where nobody knows."""
         line_deg = looked_along(in_hand.judged, in_hand.home)
-        sees_more = await self.has_seen_more_near(in_hand.maps, line_deg, required_m(in_hand.judged))
+        sees_more = await self.has_seen_more_near(in_hand.asked.maps, line_deg, required_m(in_hand.judged))
+        self._check_in_hand(in_hand)
+        return sees_more
+
+    def _check_in_hand(self, in_hand: _InHand) -> None:
+        """Raises NotFoundError where it was put away meanwhile."""
         if self._in_hand is not in_hand:
             raise NotFoundError(NOWHERE, advice="Ask for the way again.")
-        if sees_more:
-            what = "Sensors have seen more near the way since it was judged."
-            raise CheckNeededError(what, advice="Ask for the way again.")
 
     async def _apart(self, judged: WayJudged, others: Others) -> Apart:
         """By where all are now."""
@@ -295,8 +332,7 @@ class WayDesk:
     async def _check_apart(self, in_hand: _InHand, others: Others) -> None:
         """Raises CheckNeededError where it would lead near another vehicle by now of which the card says nothing."""
         apart = await self._apart(in_hand.judged, others)
-        if self._in_hand is not in_hand:
-            raise NotFoundError(NOWHERE, advice="Ask for the way again.")
+        self._check_in_hand(in_hand)
         if apart.reasons:
             raise CheckNeededError(apart.reasons[0].text, advice=apart.reasons[0].mend)
         if new := apart.noted - in_hand.apart.noted:
