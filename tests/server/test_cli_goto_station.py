@@ -10,6 +10,7 @@ import pytest
 
 from server.app import origin_file
 from server.errors import CheckNeededError
+from server.flying.apart.way_apart import Others
 from server.schemas import GuidedState, LeaseDoc, ReasonDoc, WayDoc
 from tests.server.cli_runs import Run, hedgehop
 from tests.server.running import Running
@@ -26,7 +27,8 @@ class Desk:
         self.refuses: Exception | None = None
         self.asked: list[tuple[Any, ...]] = []
 
-    async def judge(self, operator: Any, body: Any) -> GuidedState:
+    async def judge(self, operator: Any, body: Any, others: Others) -> GuidedState:
+        assert list(others()) == []
         place = None if body.place is None else (body.place.lat_deg, body.place.lon_deg)
         self.asked.append(("judge", body.action, place, body.height_m))
         way = WayDoc(
@@ -36,7 +38,8 @@ class Desk:
         )  # fmt: skip
         return GuidedState(way=way)
 
-    async def fly(self, operator: Any, body: Any) -> None:
+    async def fly(self, operator: Any, body: Any, others: Others) -> None:
+        assert list(others()) == []
         self.asked.append(("fly", body.id, body.accept_return))
         if self.refuses is not None:
             raise self.refuses
@@ -80,7 +83,11 @@ def test_a_check_or_a_way_that_is_not_clear_is_put_away_and_not_flown(served: Ru
     assert "--accept-return" in refused.err
     desk.problem = "way"
     assert goto(served, "height", "--accept-return").code == 1
-    assert [each[0] for each in desk.asked] == ["judge", "drop"] * 3
+    desk.problem = "others"
+    assert goto(served, "height", "--accept-return").code == 1
+    run = hedgehop("goto", "station", "height", "--data-dir", served.settings.data_dir)
+    assert run.out.startswith("VEHICLE IN THE WAY: 30 m")
+    assert [each[0] for each in desk.asked] == ["judge", "drop"] * 5
     desk.problem, desk.asked[:] = "return", []
     assert goto(served, "height", "--accept-return").json["ordered"]
     assert desk.asked[-1] == ("fly", "judged", True)
