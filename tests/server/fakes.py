@@ -12,6 +12,7 @@ from server.door.hub import Hub
 from server.door.lease import Lease
 from server.door.operators import Operators
 from server.errors import NotFoundError, NotReadyError, StaleRevisionError
+from server.flying.apart.nearness import Flown
 from server.flying.checklists import Checklists
 from server.heard.agents import Agents
 from server.library import Library
@@ -209,6 +210,7 @@ class FakeFlying:
     """A lease and nothing to command; keeps what it was asked."""
 
     def __init__(self, library: Library, hub: Hub) -> None:
+        self.number = 1
         self.lease = Lease(library.root / "lease.json")
         self.operators = Operators(self.lease, hub)
         self.asked: list[tuple[Any, ...]] = []
@@ -253,6 +255,10 @@ class FakeFleet:
         self.first.asked.append(("close",))
 
     def present(self) -> list[ServerMessage]:
+        return []
+
+    def others_in_air(self, number: int) -> list[Flown]:
+        del number
         return []
 
     def of(self, number: int) -> FakeFlying:
