@@ -8,17 +8,15 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
-from secrets import token_hex
 from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from pyproj import CRS
-from pyproj.crs import CompoundCRS
-from pyproj.exceptions import CRSError
 
-from planning.errors import ParameterError, RasterError
+from planning.errors import ParameterError
 from planning.terrain.catalogue.joined_models import Catalogue, open_catalogue
 from planning.terrain.dsm import Dsm
+from planning.terrain.grid_file import GridPlace, rows_written
 from planning.terrain.orthophoto import Orthophoto, OrthophotoPlan, drape, plan_orthophoto
 from planning.terrain.rasters import georef, sandbox
 from planning.terrain.rasters.assemble import ReadReport, assemble
@@ -114,27 +112,8 @@ def read_orthophoto(
 
 def write_dsm(path: str | os.PathLike[str], dsm: Dsm) -> None:
     """A tiled, compressed GeoTIFF from which ``read_dsm`` gets grid, reference system and datum back."""
-    target = Path(path)
-    with sandbox.private_directory() as directory:
-        heights, written = directory / token_hex(8), target.parent / f".{token_hex(8)}.tif"
-        job = {
-            "job": "write_grid",
-            "source": str(heights),
-            "target": str(written.absolute()),
-            "writable": [str(directory), str(target.parent.absolute())],
-            "shape": dsm.elevation_m.shape,
-            "transform": tuple(dsm.transform)[:6],
-            "crs_wkt": _compound(dsm.crs, dsm.vertical_datum).to_wkt(),
-            "vertical_datum": dsm.vertical_datum,
-        }
-        try:
-            np.ascontiguousarray(dsm.elevation_m).tofile(heights)
-            sandbox.run_job(job, directory=directory, limits=_write_limits(dsm), where=target.name)
-            written.replace(target)
-        except OSError as error:
-            raise RasterError(f"The surface model cannot be written: {error.strerror}.", where=str(target)) from error
-        finally:
-            written.unlink(missing_ok=True)
+    with rows_written(path, GridPlace(dsm.transform, dsm.crs, dsm.vertical_datum, dsm.elevation_m.shape)) as put:
+        put(dsm.elevation_m)
 
 
 def _declared(how: ReadOptions) -> Declared:
@@ -156,22 +135,3 @@ def _read(path: str | os.PathLike[str], how: ReadOptions) -> tuple[Dsm, ReadRepo
     read = read_surface(source, _declared(how), all_of, first=None, progress=progress)
     assert read.stored is not None
     return assemble(read.stored, read.plan, read.stats, sha256=read.sha256, where=source.name, progress=progress)
-
-
-def _compound(crs: CRS, vertical_datum: str | None) -> CRS:
-    """The horizontal system with the datum's own system on top, where PROJ knows one of that name."""
-    if vertical_datum is None:
-        return crs
-    try:
-        vertical = CRS.from_user_input(vertical_datum)
-    except CRSError:
-        return crs
-    return CompoundCRS(f"{crs.name} + {vertical.name}", [crs, vertical]) if vertical.is_vertical else crs
-
-
-def _write_limits(dsm: Dsm) -> RasterLimits:
-    # The writer maps the heights into its address space.
-    default = RasterLimits()
-    return replace(
-        default, max_memory_bytes=default.max_memory_bytes + dsm.elevation_m.nbytes, header_s=default.decode_s
-    )

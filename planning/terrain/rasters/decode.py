@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Callable
 from functools import partial
@@ -18,7 +19,7 @@ from rasterio.windows import Window
 
 from mapping.geometry.arrays import F32
 from planning.terrain.rasters.dataset import Grid, header_of, opened_grid
-from planning.terrain.rasters.header import DATUM_TAG
+from planning.terrain.rasters.header import DATUM_TAG, STRIP_ROWS
 from planning.terrain.rasters.heights import HeightStats
 
 Json = dict[str, Any]
@@ -74,30 +75,39 @@ def read_picture(job: Json, send: Send, ask: Ask) -> None:
 
 
 def write_grid(job: Json, send: Send, ask: Ask) -> None:
-    """A tiled, compressed GeoTIFF at ``job["target"]`` of the raw float32 rows in ``job["source"]``."""
-    del ask
+    """A tiled, compressed GeoTIFF at ``job["target"]`` of the raw float32 rows from the pipe ``job["rows"]``.
+
+    Asks, with nothing, when it is ready for them. Raises OSError where they end too early.
+    """
     height, width = job["shape"]
-    rows = np.memmap(job["source"], dtype=np.float32, mode="r", shape=(height, width))
     profile = {"driver": "GTiff", "dtype": "float32", "count": 1, "height": height, "width": width, "nodata": -9999.0}
-    layout = {"tiled": True, "blockxsize": 256, "blockysize": 256, "compress": "deflate", "predictor": 3}
-    with rasterio.open(
-        job["target"],
-        "w",
-        **profile,
-        **layout,
-        BIGTIFF="IF_SAFER",
-        crs=rasterio.CRS.from_wkt(job["crs_wkt"]),
-        transform=Affine(*job["transform"]),
-    ) as target:
+    layout = {"tiled": True, "blockxsize": 256, "blockysize": STRIP_ROWS, "compress": "deflate", "predictor": 3}
+    with (
+        os.fdopen(job["rows"], "rb") as rows,
+        rasterio.open(
+            job["target"],
+            "w",
+            **profile,
+            **layout,
+            BIGTIFF="IF_SAFER",
+            crs=rasterio.CRS.from_wkt(job["crs_wkt"]),
+            transform=Affine(*job["transform"]),
+        ) as target,
+    ):
         target.update_tags(**({DATUM_TAG: job["vertical_datum"]} if job["vertical_datum"] else {}))
-        for row in range(0, height, 256):
-            part = rows[row : row + 256]
-            target.write(
-                np.where(np.isnan(part), np.float32(-9999.0), part),
-                1,
-                window=Window(0, row, width, len(part)),  # pyright: ignore[reportCallIssue]
-            )
+        ask({})
+        for row in range(0, height, STRIP_ROWS):
+            part = _next_rows(rows, min(STRIP_ROWS, height - row), width)
+            part[np.isnan(part)] = -9999.0
+            target.write(part, 1, window=Window(0, row, width, len(part)))  # pyright: ignore[reportCallIssue]
     send("done")
+
+
+def _next_rows(source: BinaryIO, count: int, width: int) -> F32:
+    part = np.empty((count, width), np.float32)
+    if source.readinto(part.reshape(-1).view(np.uint8).data) != part.nbytes:  # type: ignore[attr-defined]
+        raise OSError("its rows end too early")
+    return part
 
 
 JOBS: dict[str, Callable[[Json, Send, Ask], None]] = {

@@ -11,6 +11,8 @@ from planning.errors import RasterFormatError, RasterTooLargeError
 
 DATUM_TAG = "HEDGEHOP_VERTICAL_DATUM"
 """The tag that ``write_dsm`` leaves."""
+STRIP_ROWS = 256
+"""Height of the tiles that it writes."""
 
 
 @dataclass(frozen=True, slots=True)
