@@ -76,7 +76,7 @@ def traversability_map(
     """
     params = params or TraversabilityParams()
     _check(elevation_m, resolution_m, params)
-    half = max(1, round((params.patch_m / resolution_m - 1.0) / 2.0))
+    half = patch_reach(resolution_m, params)
     slope_rad = np.empty(elevation_m.shape, np.float32)
     roughness_m = np.empty(elevation_m.shape, np.float32)
     heights_m = np.ascontiguousarray(elevation_m, np.float32)
@@ -87,6 +87,11 @@ def traversability_map(
     index = np.rad2deg(slope_rad) * np.float32(params.slope_weight)
     index += roughness_m * np.float32(params.roughness_weight * math.sqrt(min(1.0, params.patch_m / across_m)))
     return Traversability(slope_rad, roughness_m, index, heights_m, resolution_m, params.untraversable_index)
+
+
+def patch_reach(resolution_m: float, params: TraversabilityParams | None = None) -> int:
+    """How many cells to each side a patch looks."""
+    return max(1, round(((params or TraversabilityParams()).patch_m / resolution_m - 1.0) / 2.0))
 
 
 def _check(elevation_m: NDArray[np.floating], resolution_m: float, params: TraversabilityParams) -> None:

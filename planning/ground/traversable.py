@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from affine import Affine
 from numpy.typing import NDArray
 
 from mapping.geometry.arrays import F64
-from mapping.traversability import MOST_CELLS, Traversability, TraversabilityParams, traversability_map
+from mapping.traversability import MOST_CELLS, Traversability, TraversabilityParams, patch_reach, traversability_map
 from mapping.uwb.clearing import Cleared, UwbPose, clear
 from mapping.uwb.uwb_params import UwbGeometry, UwbParams
 from planning.errors import ParameterError
 from planning.ground.landing_sites import LandingSites, landing_sites
 from planning.safe_surface.surface import block_max
-from planning.terrain.dsm import Dsm
+from planning.safe_surface.window import Box
+from planning.terrain.dsm import Dsm, SurfaceModel
 
 FINEST_M = UwbGeometry().bin_m
 """Resolution where nobody asks for another, or the model's own where that is coarser: the radar's range bins."""
@@ -49,26 +51,67 @@ class UwbScans:
     """Which of the log are not among them, and why; empty: all are."""
 
 
-def traversable_ground(
-    dsm: Dsm, resolution_m: float | None = None, params: TraversabilityParams | None = None
-) -> TraversableGround:
-    """Works out the map on cells of at most ``resolution_m``: whole cells of the model taken together, highest kept.
+@dataclass(frozen=True, slots=True)
+class MapCells:
+    """The grid of a map: so many rows and columns of the model's cells are taken together as one of its own."""
 
-    Unknown where less than ``known_share`` of those is known: a few heights say nothing of the gaps between them.
+    together: int
+    transform: Affine
+    shape: tuple[int, int]
+    """Rows, columns."""
+
+    @property
+    def resolution_m(self) -> float:
+        return float(self.transform.a)
+
+
+def map_cells(model: SurfaceModel, resolution_m: float | None = None) -> MapCells:
+    """Cells of at most ``resolution_m``: whole cells of the model taken together.
 
     A model that is coarser stays as it is; without a resolution, a model too large for the finest is taken coarser.
-    Raises ParameterError for a resolution that makes no sense and CapacityError for too many cells.
+    Raises ParameterError for a resolution that makes no sense.
     """
     if resolution_m is not None and not (math.isfinite(resolution_m) and resolution_m > 0.0):
         raise ParameterError(f"A resolution of {resolution_m:g} m makes no sense.", advice="Give metres above 0.")
-    dsm = dsm.settled(APART_M)
-    wanted_m = resolution_m or max(FINEST_M, dsm.resolution_m * math.sqrt(dsm.elevation_m.size / MOST_CELLS))
-    together = max(1, math.floor(wanted_m / dsm.resolution_m * (1.0 + 1e-6)))
+    rows, columns = model.height_px, model.width_px
+    wanted_m = resolution_m or max(FINEST_M, model.resolution_m * math.sqrt(rows * columns / MOST_CELLS))
+    together = max(1, math.floor(wanted_m / model.resolution_m * (1.0 + 1e-6)))
     if resolution_m is None:
-        while math.ceil(dsm.height_px / together) * math.ceil(dsm.width_px / together) > MOST_CELLS:
+        while math.ceil(rows / together) * math.ceil(columns / together) > MOST_CELLS:
             together += 1
-    grid = _together(dsm, together, (params or TraversabilityParams()).known_share)
+    transform = model.transform if together == 1 else model.transform @ Affine.scale(together)
+    return MapCells(together, transform, (math.ceil(rows / together), math.ceil(columns / together)))
+
+
+def traversable_ground(
+    dsm: Dsm, resolution_m: float | None = None, params: TraversabilityParams | None = None
+) -> TraversableGround:
+    """Works out the map on ``map_cells``, the highest cell of each kept.
+
+    Unknown where less than ``known_share`` of those is known: a few heights say nothing of the gaps between them.
+    Raises ParameterError for a resolution that makes no sense and CapacityError for too many cells.
+    """
+    cells = map_cells(dsm, resolution_m)
+    grid = _together(dsm.settled(APART_M), cells.together, (params or TraversabilityParams()).known_share)
     return TraversableGround(grid, traversability_map(grid.elevation_m, grid.resolution_m, params))
+
+
+def traversable_part(
+    model: SurfaceModel, cells: MapCells, box: Box, params: TraversabilityParams | None = None
+) -> Traversability:
+    """A box of the map of the whole model, bit for bit: the box and half a patch around it are looked at."""
+    outer, factor = box.grown(patch_reach(cells.resolution_m, params), cells.shape), cells.together
+    rows, columns = outer.shape
+    part = model.window(outer.row0 * factor, outer.col0 * factor, rows * factor, columns * factor)
+    found = traversable_ground(part, cells.resolution_m, params).map
+    inner = box.relative_to(outer, 1).slices
+    return replace(
+        found,
+        slope_rad=found.slope_rad[inner],
+        roughness_m=found.roughness_m[inner],
+        index=found.index[inner],
+        elevation_m=found.elevation_m[inner],
+    )
 
 
 def cleared_ground(ground: TraversableGround, scans: UwbScans, params: UwbParams | None = None) -> Cleared:

@@ -44,7 +44,7 @@ def ball(*, radius_px: float, height_m: float, block_px: int = 1, lift_m: float 
     With ``block_px`` b > 1 offsets count blocks and r is the smallest distance between their cells.
     ``lift_m`` is added to cover float32 rounding of the sums.
     """
-    reach = math.floor((radius_px * _RIM + block_px - 1) / block_px)
+    reach = ball_reach(radius_px, block_px)
     offset_px = np.maximum(np.arange(reach + 1) * block_px - (block_px - 1), 0).astype(np.float64)
     ratio2 = (offset_px[:, None] ** 2 + offset_px[None, :] ** 2) / radius_px**2
     inside = ratio2 <= _RIM**2
@@ -53,6 +53,11 @@ def ball(*, radius_px: float, height_m: float, block_px: int = 1, lift_m: float 
     height = height_m * np.sqrt(np.maximum(1 - ratio2, 0)) + lift_m  # Melita 2020, eq. 2
     weights_m[:, : reach + 1][inside] = height[inside]
     return Element(weights_m, pairs.astype(np.int64))
+
+
+def ball_reach(radius_px: float, block_px: int = 1) -> int:
+    """How many blocks of cells to each side the ball looks."""
+    return math.floor((radius_px * _RIM + block_px - 1) / block_px)
 
 
 def coarsest_block(radius_px: float) -> int:

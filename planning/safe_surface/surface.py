@@ -13,11 +13,11 @@ from numba import njit, prange
 from mapping.geometry.arrays import F32, F64
 from planning.basics.plan_model import SurfaceParams, Surfaces
 from planning.errors import ParameterError
-from planning.safe_surface.element import ball, coarsest_block, finest_block, rounding_lift_m
+from planning.safe_surface.element import ball, ball_reach, coarsest_block, finest_block, rounding_lift_m
 from planning.safe_surface.kernel import dilate_grid
 from planning.safe_surface.smooth import gaussian_grid, reach_px
 from planning.safe_surface.window import Box
-from planning.terrain.dsm import Dsm
+from planning.terrain.dsm import Dsm, SurfaceModel
 
 FLOOR_SHARE = 0.8
 """The smoothed surface stays above the model dilated with (R, 0.8 H)."""
@@ -64,6 +64,16 @@ def dilate(dsm: Dsm, *, radius_m: float, height_m: float, block_px: int = 1) -> 
     return coarse.with_elevation(dilate_grid(highest_m, element.weights_m, element.pairs))
 
 
+def dilate_part(model: SurfaceModel, box: Box, *, radius_m: float, height_m: float) -> F32:
+    """(rows, columns) of a box of ``dilate`` over the whole model, bit for bit: the box and R around it are looked at.
+
+    Each cell's sums are the same ones, rounded alike, and the largest of them does not depend on their order.
+    """
+    outer = box.grown(ball_reach(radius_m / model.resolution_m), (model.height_px, model.width_px))
+    part = dilate(outer.cut(model).as_grid(), radius_m=radius_m, height_m=height_m)
+    return box.relative_to(outer, 1).cut(part).elevation_m
+
+
 def safe_surface(dsm: Dsm, params: SurfaceParams, *, around_xy_m: F64 | None = None, margin_m: float = 2.0) -> Surfaces:
     """The surface to fly on: dilate, smooth, keep above the floor (Melita 2020, section 5); small holes were filled.
 
@@ -74,7 +84,7 @@ def safe_surface(dsm: Dsm, params: SurfaceParams, *, around_xy_m: F64 | None = N
     the Gaussian alone (``floor=False``, the paper's pipeline) sinks lower over ridges and masts.
     Raises ParameterError for R, H, sigma or points that make no sense on this model.
     """
-    _check_ball(dsm, params.radius_m, params.height_m)
+    check_ball(dsm, params.radius_m, params.height_m)
     sigma_m = params.radius_m / 10 if params.smooth_sigma_m is None else params.smooth_sigma_m
     _check_sigma(sigma_m)
     inner = Box.of(dsm) if around_xy_m is None else Box.around(dsm, around_xy_m, margin_m)
@@ -126,12 +136,13 @@ def _extent(dsm: Dsm, params: SurfaceParams, sigma_m: float, inner: Box) -> tupl
     if params.method == "fast":
         block_px = coarsest_block(radius_px)
     elif params.method == "auto":
-        block_px = finest_block(inner.grown(halo_px, dsm).shape, radius_px, AUTO_WORK)
+        block_px = finest_block(inner.grown(halo_px, dsm.elevation_m.shape).shape, radius_px, AUTO_WORK)
     # Blocks round the ball, the Gaussian and the cut outwards by up to one block each.
-    return block_px, inner.grown(halo_px + 4 * block_px, dsm)
+    return block_px, inner.grown(halo_px + 4 * block_px, dsm.elevation_m.shape)
 
 
-def _check_ball(dsm: Dsm, radius_m: float, height_m: float) -> None:
+def check_ball(dsm: SurfaceModel, radius_m: float, height_m: float) -> None:
+    """Raises ParameterError for R or H that make no sense on this model."""
     for name, value in (("radius", radius_m), ("height", height_m)):
         if not (math.isfinite(value) and value > 0):
             raise ParameterError(

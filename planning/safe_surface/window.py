@@ -8,7 +8,7 @@ import numpy as np
 
 from mapping.geometry.arrays import F64
 from planning.errors import ParameterError
-from planning.terrain.dsm import Dsm
+from planning.terrain.dsm import Dsm, SurfaceModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,14 +46,19 @@ class Box:
     def shape(self) -> tuple[int, int]:
         return self.row1 - self.row0, self.col1 - self.col0
 
-    def grown(self, px: int, dsm: Dsm) -> Box:
-        """The box with ``px`` cells more on each side, clipped to the model."""
+    def grown(self, px: int, shape: tuple[int, int]) -> Box:
+        """The box with ``px`` cells more on each side, clipped to a grid of (rows, columns)."""
         return Box(
             max(0, self.row0 - px),
             max(0, self.col0 - px),
-            min(dsm.height_px, self.row1 + px),
-            min(dsm.width_px, self.col1 + px),
+            min(shape[0], self.row1 + px),
+            min(shape[1], self.col1 + px),
         )
+
+    @property
+    def slices(self) -> tuple[slice, slice]:
+        """Rows and columns of an array of the whole grid."""
+        return slice(self.row0, self.row1), slice(self.col0, self.col1)
 
     def relative_to(self, outer: Box, block_px: int) -> Box:
         """This box in blocks of a grid that starts at ``outer``, one block wider for interpolation if there are any."""
@@ -65,6 +70,6 @@ class Box:
             -(-(self.col1 - outer.col0) // block_px) + spare,
         )
 
-    def cut(self, dsm: Dsm) -> Dsm:
-        """The model's part inside the box, clipped to the model; a view."""
-        return dsm.window(self.row0, self.col0, *self.shape)
+    def cut(self, model: SurfaceModel) -> Dsm:
+        """The model's part inside the box, clipped to the model; a view where the model is in memory."""
+        return model.window(self.row0, self.col0, *self.shape)
