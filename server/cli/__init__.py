@@ -136,6 +136,7 @@ class _LibraryCommands(_Lazy):
 class _TerrainCommands(_Lazy):
     places: ClassVar = {
         "catalogue": (".terrain.catalogue_command.catalogue", examples.TERRAIN_CATALOGUE),
+        "dilate": (".terrain.dilate_command.dilate", examples.TERRAIN_DILATE),
     }
 
 

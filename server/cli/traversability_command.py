@@ -15,10 +15,12 @@ from planning.errors import ParameterError
 from planning.ground.landing_sites import CAUTION, LandingSites
 from planning.ground.traversable import FINEST_M, cleared_ground, sites_near, traversable_ground
 from server.cli.shared import options as o
+from server.cli.shared.by_blocks import BlockOrder
 from server.cli.shared.command import DONE, FAILED, Without, command
 from server.cli.shared.files_in_out import check_directory, write_files
 from server.cli.shared.output import answer, end_progress, progress
 from server.cli.shared.terrain_given import read_model
+from server.cli.terrain.map_in_blocks import file_in, map_by_blocks, refuse_beside_cluster
 from server.schemas.traversability_docs import LandingSiteDoc, LandingSitesBody, LayerName, UwbRule
 from server.traversability.landing_site_task import described
 from server.traversability.maps import Maps, Radar
@@ -81,14 +83,20 @@ def traversability(
     resolution_m: Annotated[
         float | None, Option(help=f"Of the map; default: {FINEST_M:g}, or the model's own if coarser.")
     ] = None,
+    cluster: o.Cluster = None,
     as_json: o.AsJson = False,
     how: Annotated[o.ModelOptions, Without("max_hole_m2")],
 ) -> None:
     """Work out where a surface model can be driven on, clear foliage with a radar log, and find landing sites.
 
     Sites come from the map before clearing: what a rover may drive through, a rotor may not touch. The exit code is 1
-    when sites were asked for and there are none.
+    when sites were asked for and there are none. With --cluster the model may be larger than memory; the map is
+    written in blocks to a new file, without a radar log and sites.
     """
+    if cluster is not None:
+        refuse_beside_cluster(uwb, near)
+        _write_by_blocks(BlockOrder(dsm, how, out, cluster), resolution_m, as_json=as_json)
+        return
     place = o.parse_place(near, "--near")
     params = UwbRule.model_construct(**asdict(fused)).params()
     _check_out(out)
@@ -108,6 +116,16 @@ def traversability(
     summary = _summary(Maps(ground, radar), found, sites) | {"seconds": round(timer.seconds()["total"], 3)}
     answer(summary, _lines(summary, out), as_json=as_json)
     raise typer.Exit(FAILED if found is not None and not found.sites else DONE)
+
+
+def _write_by_blocks(order: BlockOrder, resolution_m: float | None, *, as_json: bool) -> None:
+    _check_out(order.out)
+    order_of_file = file_in(order, "before.tif")
+    order_of_file.check()
+    timer = StepTimer(progress)
+    summary = map_by_blocks(order_of_file, resolution_m, WORK_STEP, timer)
+    summary["seconds"] = round(timer.seconds()["total"], 3)
+    answer(summary, _lines(summary, order.out), as_json=as_json)
 
 
 def _check_out(out: Path) -> None:

@@ -7,7 +7,6 @@ import signal
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import dask.config
@@ -21,6 +20,7 @@ from server.errors import ClusterError, WorkerDiedError
 from server.work import cluster
 from server.work.cluster import check_where, installed, spread
 from tests.server.cluster_keys import write_keys
+from tests.server.running_workers import running_workers
 
 pytestmark = pytest.mark.xdist_group("cluster")
 
@@ -55,21 +55,9 @@ def _late(number: int) -> int:
     raise TimeoutError("the piece's own")
 
 
-@contextmanager
-def _running(workers: int = 2) -> Iterator[str]:
-    """The address of a scheduler that exists, on this machine."""
-    running = distributed.LocalCluster(
-        n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0", silence_logs=50
-    )
-    try:
-        yield running.scheduler_address
-    finally:
-        running.close()
-
-
 @pytest.fixture(scope="module")
 def scheduler() -> Iterator[str]:
-    with _running() as address:
+    with running_workers() as address:
         yield address
 
 
@@ -119,7 +107,7 @@ def test_what_a_piece_raised_just_after_it_was_looked_at_is_told_as_it_is() -> N
 
 def test_a_worker_that_dies_loses_nothing_and_a_piece_that_ends_every_worker_is_named(tmp_path: Path) -> None:
     pieces = [(tmp_path / "died", number) for number in range(6)]
-    with _running() as mortal:
+    with running_workers() as mortal:
         assert list(spread(_die_once, pieces, mortal, lambda share: None)) == list(range(6))
         assert (tmp_path / "died").exists()
         with pytest.raises(WorkerDiedError, match="piece 1 of 1: Every worker"):
@@ -149,7 +137,7 @@ def test_a_scheduler_that_is_not_there_or_has_no_worker_is_said(monkeypatch: pyt
         with pytest.raises(ClusterError, match=r"tcp://127\.0\.0\.1:1: No Dask scheduler is reached"):
             list(spread(_worked_out, [0], "tcp://127.0.0.1:1", lambda share: None))
     monkeypatch.setattr(cluster, "_JOIN_S", 1.0)
-    with _running(workers=0) as empty, pytest.raises(ClusterError, match="No worker has joined"):
+    with running_workers(workers=0) as empty, pytest.raises(ClusterError, match="No worker has joined"):
         list(spread(_worked_out, [0], empty, lambda share: None))
 
 

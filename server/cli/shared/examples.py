@@ -128,6 +128,11 @@ TERRAIN_CATALOGUE = _examples(
     ("Which models can be used, and which of them first", "hedgehop terrain catalogue maps/"),
     ("Which one counts at a place", "hedgehop terrain catalogue maps/collection.json --at 37.7300,14.9900"),
 )
+TERRAIN_DILATE = _examples(
+    ("The surface that lines keep above, as a raster", "hedgehop terrain dilate dsm.tif --radius-m 5 --height-m 3 "
+     "--out dilated.tif"),
+    ("Of a country, on all cores", "hedgehop terrain dilate country.tif --out dilated.tif --cluster local"),
+)  # fmt: skip
 PARAMS_COMPARE = _examples(
     ("With a file", "hedgehop params compare before.param --link udpin:0.0.0.0:14550"),
     ("With another vehicle", "hedgehop params compare tcp:10.0.0.8:5760 --link tcp:10.0.0.7:5760"),
@@ -211,6 +216,8 @@ TRAVERSABILITY = _examples(
     ("Where a rover can drive, as rasters", "hedgehop traversability dsm.tif --out ground"),
     ("Foliage cleared by a radar, landing sites near a point", "hedgehop traversability dsm.tif --uwb drive.npz "
      "--near 37.72902,14.99262 --rotor-span-m 0.8 --out ground --json"),
+    ("Of a model larger than memory, on all cores", "hedgehop traversability country.tif --resolution-m 0.5 "
+     "--out ground.tif --cluster local"),
 )  # fmt: skip
 BENCH = _examples(("Best of five, ratios in one run", "hedgehop bench"))
 SCENARIO = _examples(

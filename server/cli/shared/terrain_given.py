@@ -14,12 +14,16 @@ from planning.planner.part import needed_part
 from planning.terrain.catalogue.joined_models import Catalogue
 from planning.terrain.dsm import Dsm, SurfaceModel
 from planning.terrain.geotiff import open_dsm, open_models_of, read_dsm_reported
+from planning.terrain.rasters.header import RasterLimits
 from planning.terrain.rasters.http_ranges import RemoteFile, is_address
 from planning.terrain.spikes import Spike, find_spikes, remove_spikes
 from server.cli.shared.options import ModelOptions
 from server.cli.shared.output import end_progress, say_notes
 from server.settings import load_settings
 from server.work.clocks import READ_STEP, StepTimer
+
+PART_PX = 64_000_000
+"""Read at once at most where a model is worked out block by block: a quarter of a gigabyte."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,10 +45,13 @@ class OpenedModel:
         return shares if self.spikes_told else [*shares, *_spike_lines(find_spikes(part), removed=False)]
 
 
-def open_model(path: Path, timer: StepTimer, options: ModelOptions, *, quiet: bool = False) -> OpenedModel:
+def open_model(
+    path: Path, timer: StepTimer, options: ModelOptions, *, quiet: bool = False, in_parts: bool = False
+) -> OpenedModel:
     """Says what is remarkable about it, unless ``quiet``: others have said it.
 
-    Where spikes are to be removed, all of it is read: they are told by size.
+    Where spikes are to be removed, all of it is read: they are told by size. ``in_parts``: one file or its tiles, of
+    which never more is read at once than ``PART_PX``; where only more would tell what numbers mean it is refused.
     """
     say = (lambda *notes: None) if quiet else say_notes
     if options.remove_spikes:
@@ -57,7 +64,8 @@ def open_model(path: Path, timer: StepTimer, options: ModelOptions, *, quiet: bo
         say(*catalogue.warnings)
         return OpenedModel(catalogue, _made_of(catalogue), spikes_told=False)
     source = RemoteFile(str(path), load_settings().dsm_urls) if is_address(path) else path
-    model = open_dsm(source, **_how(options, timer))
+    limits = RasterLimits(max_px=PART_PX) if in_parts else None
+    model = open_dsm(source, limits=limits, **_how(options, timer))
     end_progress()
     say(*model.warnings)
     if model.report is not None and not quiet:
@@ -67,9 +75,9 @@ def open_model(path: Path, timer: StepTimer, options: ModelOptions, *, quiet: bo
 
 
 @lru_cache(maxsize=1)
-def same_model(path: Path, options: ModelOptions, sha256: str) -> OpenedModel:
+def same_model(path: Path, options: ModelOptions, sha256: str, *, in_parts: bool = False) -> OpenedModel:
     """As another process opened it and said so; kept. Raises FormatError where another file lies at that path."""
-    opened = open_model(path, StepTimer(), options, quiet=True)
+    opened = open_model(path, StepTimer(), options, quiet=True, in_parts=in_parts)
     if opened.model.sha256 != sha256:
         raise FormatError(
             "The surface model here is another one than on the machine that asks.",

@@ -1,1 +1,1 @@
-"""Surface models: what a catalogue of them holds, and models made of point clouds."""
+"""Surface models: what a catalogue of them holds, models made of point clouds, and models dilated."""
