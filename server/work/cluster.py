@@ -18,6 +18,7 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import metadata
 from pathlib import Path
+from threading import Event
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
@@ -95,22 +96,22 @@ def _answer(future: Any, tell: Callable[[], None]) -> Any:
     """Raises what the piece raised, ClusterError when the scheduler is gone."""
     from distributed import CancelledError
 
-    had_failed = False
-    while True:
+    answered = Event()
+    future.add_done_callback(lambda done: answered.set())
+    tell()
+    while not future.done():
+        answered.wait(_TOLD_EVERY_S)
         tell()
-        try:
-            return future.result(timeout=_TOLD_EVERY_S)
-        except TimeoutError:
-            if had_failed:
-                raise  # the piece's own
-            had_failed = future.status == "error"  # perhaps just now: then the next look raises what it raised
-        except (CancelledError, OSError) as error:
-            if future.status == "error":
-                raise
-            raise ClusterError(
-                "The scheduler of the cluster does not answer any more.",
-                advice="Start it again, and the command: what was not written yet is done anew.",
-            ) from error
+    try:
+        # Without a time of its own: a large answer that is given up while it comes would never come.
+        return future.result()
+    except (CancelledError, OSError) as error:
+        if future.status == "error":
+            raise  # the piece's own
+        raise ClusterError(
+            "The scheduler of the cluster does not answer any more.",
+            advice="Start it again, and the command: what was not written yet is done anew.",
+        ) from error
 
 
 @contextmanager

@@ -13,6 +13,7 @@ import dask.config
 import distributed
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from mapping.traversability import traversability_map
 from planning.errors import PoiError
@@ -30,6 +31,10 @@ def _worked_out(seed: int) -> str:
     time.sleep(0.2 if seed == 0 else 0.0)
     heights_m = np.random.default_rng(seed).uniform(0.0, 3.0, (40, 40)).astype(np.float32)
     return hashlib.sha256(traversability_map(heights_m, 0.5).index.tobytes()).hexdigest()
+
+
+def _large(number: int) -> NDArray[np.int64]:
+    return np.full(20_000_000, number, np.int64)
 
 
 def _refuse(number: int) -> int:
@@ -91,18 +96,12 @@ def test_what_a_piece_raises_comes_through_as_it_is(scheduler: str) -> None:
         list(spread(_late, [0], scheduler, lambda share: None))
 
 
-def test_what_a_piece_raised_just_after_it_was_looked_at_is_told_as_it_is() -> None:
-    class Late:
-        status = "error"
-
-        looks = 0
-
-        def result(self, timeout: float) -> None:
-            self.looks += 1
-            raise TimeoutError if self.looks == 1 else PoiError("outside")
-
-    with pytest.raises(PoiError, match="outside"):
-        cluster._answer(Late(), lambda: None)
+def test_a_large_answer_comes_though_it_is_told_often(scheduler: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "_TOLD_EVERY_S", 0.001)
+    shares: list[float] = []
+    answers = [answer.sum() for answer in spread(_large, [1, 2, 3], scheduler, shares.append)]
+    assert answers == [20_000_000, 40_000_000, 60_000_000]
+    assert len(shares) > 3
 
 
 def test_a_worker_that_dies_loses_nothing_and_a_piece_that_ends_every_worker_is_named(tmp_path: Path) -> None:
