@@ -43,12 +43,15 @@ class GridPlace:
 
 
 @contextmanager
-def rows_written(path: str | os.PathLike[str], place: GridPlace, *, within_s: float | None = None) -> Iterator[Put]:
+def rows_written(
+    path: str | os.PathLike[str], place: GridPlace, *, within_s: float | None = None, is_new: bool = False
+) -> Iterator[Put]:
     """A tiled, compressed GeoTIFF whose rows are handed over one after another; no more of them is held than a strip.
 
     The same bytes however many rows are handed over at once. It lies under its name only when all rows were taken and
-    nothing was raised. ``within_s``: after so long it is given up; None: after the time for reading one. Raises
-    RasterError where it cannot be written, before the first row is asked for if that is so from the beginning.
+    nothing was raised. ``within_s``: after so long it is given up; None: after the time for reading one. ``is_new``:
+    no other file that came to have its name meanwhile is replaced. Raises RasterError where it cannot be written,
+    before the first row is asked for if that is so from the beginning.
     """
     target = Path(path)
     written = target.parent / f".{token_hex(8)}.tif"
@@ -74,17 +77,19 @@ def rows_written(path: str | os.PathLike[str], place: GridPlace, *, within_s: fl
             begun.wait()
             if writing.done():
                 writing.result()
-            yield lambda rows: _hand_over(rows, handed, writing)
+            yield lambda rows: _hand_over(rows, place.shape[1], handed, writing)
             handed.close()
             writing.result()
-            _put_in_place(written, target)
+            _put_in_place(written, target, is_new=is_new)
         finally:
             handed.close()  # of rows that end too early nothing is made
             wait([writing])
             written.unlink(missing_ok=True)
 
 
-def _hand_over(rows: F32, handed: BinaryIO, writing: Future[Any]) -> None:
+def _hand_over(rows: F32, columns: int, handed: BinaryIO, writing: Future[Any]) -> None:
+    if rows.ndim != 2 or rows.shape[1] != columns:
+        raise RasterError(f"Its rows have {columns} cells, not {rows.shape[-1]}.")
     left = memoryview(np.ascontiguousarray(rows, np.float32).reshape(-1).view(np.uint8).data)
     try:
         while left:
@@ -94,9 +99,22 @@ def _hand_over(rows: F32, handed: BinaryIO, writing: Future[Any]) -> None:
         raise RasterError("There are more rows than it has.") from error
 
 
-def _put_in_place(written: Path, target: Path) -> None:
+def _put_in_place(written: Path, target: Path, *, is_new: bool) -> None:
     try:
-        written.replace(target)
+        if not is_new:
+            written.replace(target)
+            return
+        try:
+            os.link(written, target)
+        except FileExistsError:
+            raise
+        except OSError:  # not every file system has links
+            if target.exists():
+                raise FileExistsError from None
+            written.replace(target)
+    except FileExistsError as error:
+        what = "A file of that name was made meanwhile, and is not replaced."
+        raise RasterError(what, where=str(target), advice="Give another name.") from error
     except OSError as error:
         raise RasterError(f"It cannot be written: {error.strerror}.", where=str(target)) from error
 

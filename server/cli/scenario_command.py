@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated
 
@@ -75,11 +76,12 @@ def scenario(
     def flying(share: float) -> None:
         progress(f"Flying {name}", share if seeds > 1 else None)
 
-    for result in spread(_fly, wanted, cluster, flying):
-        results.append(result)
-        end_progress()
-        if not as_json:
-            typer.echo("\n".join(results[-1].lines()))
+    with closing(spread(_fly, wanted, cluster, flying)) as flown:
+        for result in flown:
+            results.append(result)
+            end_progress()
+            if not as_json:
+                typer.echo("\n".join(results[-1].lines()))
     if plots is not None:
         _draw(plots, results[0])
     if as_json:

@@ -13,12 +13,12 @@ import logging
 import os
 import socket
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from threading import Event
+from threading import Event, Lock
 from typing import Any, TypeVar
 from urllib.parse import urlsplit
 
@@ -36,16 +36,18 @@ PER_WORKER = 4
 _REACH_S, _JOIN_S, _TOLD_EVERY_S = 30.0, 30.0, 0.5
 _START_S = 180.0
 """On a machine that has much else to do processes take long to come up."""
+_ONE_PIECE = Lock()
 _DECIDE = ("numpy", "numba", "scipy", "rasterio", "pyproj")
 _LOOPBACK = frozenset({"127.0.0.1", "::1", "localhost"})
 
 
-def spread(function: Callable[[A], R], pieces: Sequence[A], where: str | None, done: Done) -> Iterator[R]:
+def spread(function: Callable[[A], R], pieces: Sequence[A], where: str | None, done: Done) -> Generator[R]:
     """``function`` of each piece, in the pieces' order; ``done(share)`` is told how many are finished.
 
     ``function`` is found by its module on a worker, so it and the pieces must pickle; files that it reads must lie
     there at the same path. ``where``: None here, ``local`` or ``local:N`` processes of this machine, or the
-    ``tls://HOST:PORT`` of a Dask scheduler. Raises ClusterError, WorkerDiedError, and whatever ``function`` raises.
+    ``tls://HOST:PORT`` of a Dask scheduler. Who breaks off has to close it: left to the collector it would wait for
+    workers that are gone. Raises ClusterError, WorkerDiedError, and whatever ``function`` raises.
     """
     if where is None:
         for number, piece in enumerate(pieces):
@@ -64,7 +66,7 @@ def check_where(where: str) -> None:
         _check_address(where)
 
 
-def _in_order(client: Any, function: Callable[[A], R], pieces: Sequence[A], done: Done) -> Iterator[R]:
+def _in_order(client: Any, function: Callable[[A], R], pieces: Sequence[A], done: Done) -> Generator[R]:
     from distributed import KilledWorker
 
     waiting: deque[Any] = deque()
@@ -207,7 +209,9 @@ def _check_workers(client: Any, where: str) -> None:
         client.wait_for_workers(1, timeout=_JOIN_S)
     except TimeoutError as error:
         raise ClusterError(
-            "No worker has joined this scheduler.", where=where, advice="Start some: dask worker ADDRESS."
+            "No worker has joined this scheduler.",
+            where=where,
+            advice="Start some: dask worker ADDRESS --nthreads 1 --nworkers auto.",
         ) from error
     try:
         client.run(check_same, installed())
@@ -218,9 +222,11 @@ def _check_workers(client: Any, where: str) -> None:
 
 
 def _answered(function: Callable[[A], R], piece: A, asked_with: dict[str, str]) -> R:
-    """On the worker, which may have joined after the others were looked at."""
+    """On the worker, which may have joined after the others were looked at. One piece at a time: a worker of several
+    threads shares what it keeps of a model, and not every kernel bears two callers."""
     check_same(asked_with)
-    return function(piece)
+    with _ONE_PIECE:
+        return function(piece)
 
 
 def check_same(asked_with: dict[str, str]) -> None:

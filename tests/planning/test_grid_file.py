@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +51,13 @@ def test_what_is_broken_off_leaves_nothing(tmp_path: Path, heights: F32, stop: t
 
 
 @pytest.mark.parametrize(
-    ("rows", "said"), [(ROWS - 1, "its rows end too early"), (100 * ROWS, "more rows than it has")]
+    ("rows", "said"),
+    [
+        (ROWS - 1, "its rows end too early"),
+        (ROWS + 1, "more rows than it has"),
+        (ROWS + 60, "more rows than it has"),
+        (100 * ROWS, "more rows than it has"),
+    ],
 )
 def test_rows_that_are_missing_or_too_many_are_said(tmp_path: Path, rows: int, said: str) -> None:
     with pytest.raises(RasterError, match=said), rows_written(tmp_path / "rows.tif", PLACE) as put:
@@ -63,3 +70,39 @@ def test_where_nothing_can_be_written_is_said_before_the_first_row_is_asked_for(
     with pytest.raises(RasterError, match="cannot be written"), rows_written(tmp_path / "none" / "rows.tif", PLACE):
         asked = True
     assert not asked
+
+
+def test_rows_of_another_width_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(RasterError, match="290 cells, not 531"), rows_written(tmp_path / "rows.tif", PLACE) as put:
+        put(np.zeros((COLUMNS, ROWS), np.float32))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("short", [1, 100, 5000])
+def test_a_file_that_is_cut_short_as_it_is_closed_replaces_no_other(tmp_path: Path, heights: F32, short: int) -> None:
+    with rows_written(tmp_path / "rows.tif", PLACE) as put:
+        put(heights)
+    size = (tmp_path / "rows.tif").stat().st_size
+    (tmp_path / "rows.tif").write_bytes(b"the one before")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size - short, before[1]))
+    try:
+        with pytest.raises(RasterError), rows_written(tmp_path / "rows.tif", PLACE) as put:
+            put(heights)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert (tmp_path / "rows.tif").read_bytes() == b"the one before"
+    assert [path.name for path in tmp_path.iterdir()] == ["rows.tif"]
+
+
+def test_a_new_file_replaces_none_that_came_meanwhile(tmp_path: Path, heights: F32) -> None:
+    with (  # noqa: PT012
+        pytest.raises(RasterError, match="made meanwhile"),
+        rows_written(tmp_path / "rows.tif", PLACE, is_new=True) as put,
+    ):
+        put(heights)
+        (tmp_path / "rows.tif").write_bytes(b"mine")
+    assert (tmp_path / "rows.tif").read_bytes() == b"mine"
+    with rows_written(tmp_path / "new.tif", PLACE, is_new=True) as put:
+        put(heights)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["new.tif", "rows.tif"]

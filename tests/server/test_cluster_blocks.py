@@ -6,9 +6,13 @@ import importlib
 import math
 import os
 import signal
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import NoReturn
 
 import distributed
 import numpy as np
@@ -16,13 +20,14 @@ import pytest
 from affine import Affine
 
 from mapping.geometry.arrays import F32
-from planning.errors import NoElevationError
+from planning.errors import NoElevationError, RasterError
 from planning.ground.traversable import map_cells, traversable_ground
 from planning.safe_surface.surface import dilate
 from planning.terrain.dsm import LARGE_PX
 from planning.terrain.geotiff import read_dsm, write_dsm
-from planning.terrain.grid_file import GridPlace
-from server.cli.shared.by_blocks import BlockOrder, blocks_of, write_by_blocks
+from planning.terrain.grid_file import GridPlace, Put
+from server.cli.shared import by_blocks
+from server.cli.shared.by_blocks import Block, BlockOrder, blocks_of, write_by_blocks
 from server.cli.shared.options import ModelOptions
 from server.cli.terrain.dilate_command import Dilation
 from server.cli.terrain.map_in_blocks import MapWork
@@ -37,6 +42,7 @@ from tests.server.running_workers import running_workers
 pytestmark = pytest.mark.xdist_group("cluster")
 
 RADIUS_M, HEIGHT_M = 3.1, 2.0
+ROWS, COLUMNS = 40, 30
 DEGREES = Affine(5e-6, 0.0, 14.99, 0.0, -4e-6, 37.73)
 Told = Callable[[float], None]
 
@@ -256,3 +262,53 @@ def test_without_dask_it_says_how_to_get_it(
     run = hedgehop("terrain", "dilate", models["metres"], "--out", tmp_path / "a.tif", "--cluster", "local")
     assert "pip install 'hedgehop[cluster]'" in run.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_worker_of_several_threads_does_one_piece_at_a_time() -> None:
+    """What it keeps of a model is shared by its threads."""
+    at_once, most = [0], [0]
+
+    def look(piece: int) -> int:
+        at_once[0] += 1
+        most[0] = max(most[0], at_once[0])
+        time.sleep(0.01)
+        at_once[0] -= 1
+        return piece
+
+    asked_with = cluster.installed()
+    with ThreadPoolExecutor(4) as pool:
+        answers = list(pool.map(lambda piece: cluster._answered(look, piece, asked_with), range(12)))
+    assert answers == list(range(12))
+    assert most == [1]
+
+
+def test_what_breaks_off_while_blocks_come_ends_the_work_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A disk that is full: left to the collector, the cluster would be waited for when the command has ended."""
+    ends: list[str] = []
+
+    def answers(*_: object) -> Generator[Block]:
+        try:
+            while True:
+                yield Block(np.zeros((ROWS, COLUMNS), np.float32), 1, (1,))
+        finally:
+            ends.append("closed")
+
+    @contextmanager
+    def full(*_: object, **__: object) -> Iterator[Put]:
+        def put(rows: F32) -> NoReturn:
+            raise RasterError("The disk is full.")
+
+        yield put
+
+    monkeypatch.setattr(by_blocks, "spread", answers)
+    monkeypatch.setattr(by_blocks, "rows_written", full)
+    write_raster(tmp_path / "dsm.tif", np.ones((ROWS, COLUMNS), np.float32))
+    order = BlockOrder(tmp_path / "dsm.tif", ModelOptions(), tmp_path / "out.tif", "local:1")
+    opened = order.open(StepTimer(lambda *_: None))
+    place = GridPlace(opened.model.transform, opened.model.crs, opened.model.vertical_datum, (ROWS, COLUMNS))
+    with pytest.raises(RasterError) as raised:
+        write_by_blocks(order, opened, place, Dilation(RADIUS_M, HEIGHT_M), lambda _: None)
+    assert raised.value.__traceback__ is not None, "which holds the frames"
+    assert ends == ["closed"]

@@ -77,7 +77,8 @@ def read_picture(job: Json, send: Send, ask: Ask) -> None:
 def write_grid(job: Json, send: Send, ask: Ask) -> None:
     """A tiled, compressed GeoTIFF at ``job["target"]`` of the raw float32 rows from the pipe ``job["rows"]``.
 
-    Asks, with nothing, when it is ready for them. Raises OSError where they end too early.
+    Asks, with nothing, when it is ready for them. Raises OSError where they end too early, or go on, and where what is
+    written last cannot be read back: closing a file tells nothing of a disk that is full.
     """
     height, width = job["shape"]
     profile = {"driver": "GTiff", "dtype": "float32", "count": 1, "height": height, "width": width, "nodata": -9999.0}
@@ -96,11 +97,26 @@ def write_grid(job: Json, send: Send, ask: Ask) -> None:
     ):
         target.update_tags(**({DATUM_TAG: job["vertical_datum"]} if job["vertical_datum"] else {}))
         ask({})
+        part, last = np.empty((0, width), np.float32), Window(0, 0, width, 0)  # pyright: ignore[reportCallIssue]
         for row in range(0, height, STRIP_ROWS):
             part = _next_rows(rows, min(STRIP_ROWS, height - row), width)
             part[np.isnan(part)] = -9999.0
-            target.write(part, 1, window=Window(0, row, width, len(part)))  # pyright: ignore[reportCallIssue]
+            last = Window(0, row, width, len(part))  # pyright: ignore[reportCallIssue]
+            target.write(part, 1, window=last)
+        if rows.read(1):
+            raise OSError("there are more rows than it has")
+    _check_read_back(job["target"], last, part)
     send("done")
+
+
+def _check_read_back(path: str, window: Window, heights: F32) -> None:
+    try:
+        with rasterio.open(path) as written:
+            found = written.read(1, window=window)
+    except rasterio.RasterioIOError as error:
+        raise OSError("it was cut short") from error
+    if not np.array_equal(found, heights):
+        raise OSError("it was cut short")
 
 
 def _next_rows(source: BinaryIO, count: int, width: int) -> F32:

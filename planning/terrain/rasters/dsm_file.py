@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mapping.geometry.arrays import F64
+from mapping.geometry.arrays import F32, F64
 from planning.errors import ParameterError, RasterFormatError
 from planning.terrain.dsm import LARGE_PX, Dsm, SurfaceModel
 from planning.terrain.projects import doubts_of_name
@@ -80,12 +80,13 @@ class DsmFile(SurfaceModel):
         if rows.start >= rows.stop or columns.start >= columns.stop:
             raise ParameterError("The window lies outside the surface model.")
         pixels = needed_pixels(self._first.plan, (rows, columns))
-        if self._whole is None and not (self._kept is not None and self._kept[0].holds(pixels)):
-            self._read_around(pixels)
+        part = self._kept  # another thread may keep another one meanwhile
+        if self._whole is None and not (part is not None and part[0].holds(pixels)):
+            part = self._read_around(pixels)
         if self._whole is not None:
             return self._whole.window(row0, col0, height_px, width_px)
-        assert self._kept is not None
-        kept, stored = self._kept
+        assert part is not None
+        kept, stored = part
         return part_of(self._first.plan, stored, kept, (rows, columns), sha256=self.sha256, name=self.name)
 
     def forget(self) -> None:
@@ -102,8 +103,8 @@ class DsmFile(SurfaceModel):
             out[inside] = self.around(xy[inside], self.resolution_m).elevation_at(xy[inside])
         return out
 
-    def _read_around(self, pixels: Pixels) -> None:
-        """Reads all where the part does not tell what its numbers mean."""
+    def _read_around(self, pixels: Pixels) -> tuple[Pixels, F32] | None:
+        """None: all was read, for the part does not tell what its numbers mean."""
         header, plan = self._first.plan.header, self._first.plan
         row0, column0 = max(0, pixels.row0 - AHEAD_PX), max(0, pixels.column0 - AHEAD_PX)
         rows = min(header.height_px, pixels.row0 + pixels.rows + AHEAD_PX) - row0
@@ -113,10 +114,11 @@ class DsmFile(SurfaceModel):
         if read.stats.sentinels:
             self._check_sentinels(read)
             self.whole()
-            return
+            return None
         assert read.stored is not None
         mask_and_scale(read.stored, sentinels=(), scale=plan.height_scale, offset=plan.height_offset)
-        self._kept = wanted, read.stored
+        self._kept = part = wanted, read.stored
+        return part
 
     @property
     def _can_be_whole(self) -> bool:

@@ -122,7 +122,7 @@ def _explain(error: Exception, job: str) -> Json:
         return {
             "kind": "write",
             "what": f"It cannot be written ({cause}).",
-            "advice": "Check the folder and its rights.",
+            "advice": "Check the free space, the folder and its rights.",
         }
     return {
         "kind": "format",

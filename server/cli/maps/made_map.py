@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -74,12 +75,12 @@ def make_all(
         raise FormatError("There is no recording (.mcap) in it.", where=str(folder), advice="Choose another folder.")
     check_directory(out)
     orders = [MapOrder(path.absolute(), sensor, kind, other) for path in recordings]
-    answers = spread(_tried, orders, cluster, lambda share: progress("Building maps", share))
     found = []
-    for recording, answer in zip(recordings, answers, strict=True):
-        end_progress()
-        name = recording.relative_to(folder)
-        found.append({"recording": str(name)} | _taken(answer, out / name.with_suffix(f".{kind}")))
+    with closing(spread(_tried, orders, cluster, lambda share: progress("Building maps", share))) as answers:
+        for recording, answer in zip(recordings, answers, strict=True):
+            end_progress()
+            name = recording.relative_to(folder)
+            found.append({"recording": str(name)} | _taken(answer, out / name.with_suffix(f".{kind}")))
     return found
 
 

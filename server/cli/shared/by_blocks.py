@@ -8,7 +8,8 @@ while here each worker has the file and reads the rims itself.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -113,8 +114,11 @@ def write_by_blocks(
     """
     boxes = blocks_of(place.shape, order.most, together)
     order.out.parent.mkdir(parents=True, exist_ok=True)
-    with rows_written(order.out, place, within_s=_WITHIN_S) as put:
-        totals = _put_in_rows(put, boxes, _worked(order, opened, work, boxes, told), place.shape[1])
+    with (
+        rows_written(order.out, place, within_s=_WITHIN_S, is_new=True) as put,
+        closing(_worked(order, opened, work, boxes, told)) as blocks,
+    ):
+        totals = _put_in_rows(put, boxes, blocks, place.shape[1])
         if totals[0] == 0:
             raise NoElevationError(
                 "Every cell is unknown.",
@@ -139,7 +143,7 @@ def blocks_of(shape: tuple[int, int], most: tuple[int, int], together: int = 1) 
 
 def _worked(
     order: BlockOrder, opened: OpenedModel, work: BlockWork, boxes: list[Box], told: Callable[[float], None]
-) -> Iterator[Block]:
+) -> Generator[Block]:
     if order.cluster is None:
         yield from spread(partial(work.block_of, opened.model), boxes, None, told)
         return
