@@ -30,10 +30,13 @@ DEFLATED = 0x40
 MESSAGES = 300
 
 
-def test_what_waits_for_a_slow_line_is_replaced_by_what_is_newer(
-    served: Running, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(slow_lines, "STALLED_S", 60.0)  # a busy machine takes long to publish it all
+@pytest.fixture(autouse=True)
+def patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy machine may take long to read, or to publish it all."""
+    monkeypatch.setattr(slow_lines, "STALLED_S", 60.0)
+
+
+def test_what_waits_for_a_slow_line_is_replaced_by_what_is_newer(served: Running) -> None:
     with _slow_page(served) as line:
         for number in range(MESSAGES):
             served.on_loop(_publish(served, number))
@@ -119,6 +122,8 @@ async def _publish(served: Running, number: int, length: int = 1500) -> None:
 
 
 def _slow_page(served: Running, also: str = "") -> socket.socket:
+    while served.parts.hub.session_keys():  # the page of the test before has gone, and its server has not seen it yet
+        time.sleep(0.01)
     line = socket.socket()
     line.settimeout(60)
     line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
