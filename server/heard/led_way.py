@@ -11,20 +11,29 @@ from telemetry.topics.vehicle import VehicleState
 
 Places = tuple[tuple[float, float, float], ...]
 """(K,) lat_deg, lon_deg, alt_rel_home_m"""
-SOONER_SHARE, LATER_SHARE, LATE_S = 0.1, 2.0, 10.0
+SOONER_SHARE, LATE_S = 0.1, 10.0
+LATER_SHARE, TURNING_LATER_SHARE = 2.0, 6.0
 """Of the times that a way's lengths and speeds give: it comes to a place no sooner than so much less, and no later than
-so much more; ``LATE_S`` besides. Gathering speed, slowing down at corners and at the end, and what is kept back for a
-link that falls silent make it late: by 60 % to 220 % on ways of 30 m to 300 m, as it is led."""
+so much more; ``LATE_S`` besides. Gathering speed, stopping and what is kept back for a link that falls silent make a
+straight way late, by up to 60 %; turns are far slower than that: orbits of 10 m to 20 m and zigzags take three to six
+times as long as they are led (``telemetry.flight.guided``)."""
+STRAIGHT_PLACES = 5
+"""Of a way that climbs, goes there and comes down; one of more places turns."""
 LOOK_M = 10.0
 """So far along the way it may have come since the last look, beside what it flies in that time."""
 ON_IT_M = 1.0
 """Of several legs that are as near as that the first one is it."""
 
 
-def led_ahead(places: F64, t_s: F64, off_m: float = 0.0) -> Ahead:
-    """``places``: (N, 3) as ``Places``; ``t_s``: (N,) from now, as lengths and speeds give them. Told are the middle of
-    when it may be there, and how far from that."""
-    middle, half = 1.0 + (LATER_SHARE - SOONER_SHARE) / 2.0, (LATER_SHARE + SOONER_SHARE) / 2.0
+def later_share(places: int) -> float:
+    """Of a whole way of so many places."""
+    return LATER_SHARE if places <= STRAIGHT_PLACES else TURNING_LATER_SHARE
+
+
+def led_ahead(places: F64, t_s: F64, later: float, off_m: float = 0.0) -> Ahead:
+    """``places``: (N, 3) as ``Places``; ``t_s``: (N,) from now, as lengths and speeds give them; ``later``: the whole
+    way's ``later_share``. Told are the middle of when it may be there, and how far from that."""
+    middle, half = 1.0 + (later - SOONER_SHARE) / 2.0, (later + SOONER_SHARE) / 2.0
     return Ahead(
         places[:, :2],
         places[:, 2],
@@ -35,9 +44,9 @@ def led_ahead(places: F64, t_s: F64, off_m: float = 0.0) -> Ahead:
     )
 
 
-def latest_s(t_s: float) -> float:
+def latest_s(t_s: float, later: float) -> float:
     """When it is there at the latest."""
-    return (1.0 + LATER_SHARE) * t_s + LATE_S
+    return (1.0 + later) * t_s + LATE_S
 
 
 class LedWay:
@@ -71,7 +80,8 @@ class LedWay:
             return None
         t_s = np.concatenate([[0.0], np.cumsum(self._legs_s)])
         here_s = t_s[self._leg] + self._share * self._legs_s[self._leg]
-        return led_ahead(self._places[self._leg + 1 :], t_s[self._leg + 1 :] - here_s, off_m)
+        rest, later = slice(self._leg + 1, None), later_share(len(self._places))
+        return led_ahead(self._places[rest], t_s[rest] - here_s, later, off_m)
 
     def _find(self, points_m: F64, t_s: float | None) -> float:
         """Moves on to the place that it may have come to, and tells how far beside it the vehicle is."""

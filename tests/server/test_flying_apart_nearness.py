@@ -124,7 +124,7 @@ def test_a_way_that_is_led_adds_to_straight_on_and_takes_nothing_away() -> None:
     there = np.array([[*moved_deg(HOME, 60.0, 0.0), 20.0]])
 
     def led(state: VehicleState) -> Flown:
-        told = Flown("Bee", state, led_ahead(there, np.array([20.0]), 12.0))
+        told = Flown("Bee", state, led_ahead(there, np.array([20.0]), 2.0, 12.0))
         return Flown("Bee", state, None, told=told)
 
     hovers = Flown("Wasp", flying(60), None)

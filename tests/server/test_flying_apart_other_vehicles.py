@@ -232,23 +232,40 @@ def test_who_stands_on_its_way_is_in_it_until_he_is_led_away() -> None:
     assert told(standing(EAST), higher).state == "accept"
     # Nobody knows whether it is still there.
     long_ago = replace(state, position_t_mono_s=NOW_S - 60.0)
-    assert told(standing(EAST), replace(hovers, flown=Flown("Bee", long_ago, None))).state == "accept"
+    row = told(standing(EAST), replace(hovers, flown=Flown("Bee", long_ago, None)))
+    assert row.state == "accept"
+    assert "may come within 0 m of Bee" in row.text
+    assert row.text.endswith("It was last heard 60 s ago.")
 
     def led(north_m: float) -> Other:
         aside = replace(state, lat_deg=moved_deg(HOME, 300, 100.0)[0])
         places = np.array([(*moved_deg(HOME, 300, north_m), 20.0)])
-        way = led_ahead(places, np.array([abs(100.0 - north_m) / SPEED_M_S]))
+        way = led_ahead(places, np.array([abs(100.0 - north_m) / SPEED_M_S]), 2.0)
         return replace(hovers, flown=Flown("Bee", aside, None, told=Flown("Bee", aside, way)))
 
     assert told(standing(EAST), led(50.0)).state == "accept"
     assert told(standing(EAST), led(3.0)).state == "bad"
 
 
-def test_who_holds_beside_another_one_may_go_on_away_from_it() -> None:
-    mine = standing(EAST)
-    here = replace(mine, waits_in_air=True, flies=True)
-    lat_deg, lon_deg = moved_deg(HOME, -9.0, 0)
-    beside = replace(flying(ACROSS, 20.0).flown.state, lat_deg=lat_deg, lon_deg=lon_deg, alt_amsl_m=HOME_ALT_M)
+def test_who_holds_beside_another_one_may_go_on_away_from_it_and_not_come_back() -> None:
+    def holds(plan: Whole) -> Other:
+        return replace(standing(replace(plan, takeoff_s=0.0)), waits_in_air=True, flies=True)
+
+    lat_deg, lon_deg = moved_deg(HOME, 91.0, 0)
+    up_m = EAST.alt_rel_home_m[1]
+    beside = replace(flying(ACROSS, 20.0).flown.state, lat_deg=lat_deg, lon_deg=lon_deg, alt_amsl_m=HOME_ALT_M + up_m)
     other = Other(Flown("Bee", beside, None), flies=True, on_board=None)
-    assert told(here, other).state == "accept"
-    assert told(mine, other).state == "bad"
+
+    def from_100_m(plan: Whole) -> Whole:
+        assert plan.t_s is not None
+        return replace(
+            plan,
+            lat_lon_deg=plan.lat_lon_deg[2:],
+            alt_rel_home_m=plan.alt_rel_home_m[2:],
+            t_s=plan.t_s[2:] - plan.t_s[2],
+        )
+
+    assert told(holds(from_100_m(whole((0, 0), (100, 0), (400, 0)))), other).state == "accept"
+    row = told(holds(from_100_m(whole((0, 0), (100, 0), (300, 0), (91, 0)))), other)
+    assert row.state == "bad"
+    assert "may come within 0 m of Bee" in row.text

@@ -10,7 +10,7 @@ import pytest
 
 from mapping.geometry.frames import moved_deg, offset_m
 from server.heard.channel import Channel
-from server.heard.led_way import LATE_S, LATER_SHARE, SOONER_SHARE, LedWay
+from server.heard.led_way import LATE_S, LATER_SHARE, SOONER_SHARE, LedWay, latest_s
 from server.heard.plan_follower import OFF_LINE_M, Ahead
 from telemetry.topics.messages import FlightStatus
 from telemetry.topics.vehicle import VehicleState
@@ -41,7 +41,7 @@ def soonest_latest_s(ahead: Ahead | None) -> list[tuple[float, float]]:
 
 
 def between_s(t_s: float) -> tuple[float, float]:
-    return round((1 - SOONER_SHARE) * t_s - LATE_S, 1), round((1 + LATER_SHARE) * t_s + LATE_S, 1)
+    return round((1 - SOONER_SHARE) * t_s - LATE_S, 1), round(latest_s(t_s, LATER_SHARE), 1)
 
 
 def test_what_is_left_gets_shorter_and_a_way_back_over_itself_is_not_cut_short() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from mapping.geometry.frames import moved_deg, offset_m
 from server.flying.apart.nearness import AHEAD_S, NEAR_M, RADIUS_M, Flown
 from server.flying.apart.way_apart import NEARER_M, Apart, way_apart
-from server.heard.led_way import led_ahead
+from server.heard.led_way import later_share, led_ahead
 from server.heard.plan_follower import Ahead
 from telemetry.topics.vehicle import VehicleState
 
@@ -78,7 +79,10 @@ def test_who_begins_too_near_may_part_and_come_back_no_more() -> None:
     near = [Flown("Bee", at(8.0), None)]
     parts = way((0.0, 0.0), (-40.0, 0.0), others=near)
     assert parts.reasons == ()
-    assert parts.notes == ("It begins within 2 m of Bee, and leads apart from it.",)
+    assert parts.notes == ("It begins within 2 m of Bee.",)
+    around = [(8.0 - 8.0 * math.cos(k * math.pi / 8), 8.0 * math.sin(k * math.pi / 8)) for k in range(17)]
+    assert way(*around, others=near).reasons, "it goes around it, and parts never"
+    assert way((0.0, 0.0), (0.0, 0.1), others=near).notes, "it turns its nose, and stays"
     assert way((0.0, 0.0), (-3.0, 0.0), (40.0, 0.0), others=near).reasons
     assert way((0.0, 0.0), (NEARER_M + 1.0, 0.0), others=near).reasons
     assert way((0.0, 0.0), (-60.0, 0.0), (-60.0, 30.0), (16.0, 30.0), (16.0, 0.0), others=near).reasons
@@ -98,15 +102,40 @@ def test_one_that_is_silent_or_tells_no_place_is_named() -> None:
     nowhere = Flown("Bee", replace(at(900.0), lat_deg=None, lon_deg=None), None)
     apart = way((0.0, 0.0), (30.0, 0.0), others=[nowhere])
     assert apart.notes == ("Bee is in the air, and does not tell where.",)
-    assert apart.noted == {"Bee"}
+    assert apart.noted == {("Bee", "nowhere")}
+    foreign = Flown("Bravo's Bee", replace(at(900.0), position_t_mono_s=NOW_S - 5.5), None, key="Bravo/1")
+    assert way((0.0, 0.0), (30.0, 0.0), others=[foreign]).noted == {("Bravo's Bee", "silent Bravo/1")}
+    by_hand = Flown("Bravo's Bee", at(900.0, v_east_m_s=5.0), None, key="Bravo/1")
+    assert way((0.0, 0.0), (30.0, 0.0), others=[by_hand]).noted == {("Bravo's Bee", "unplanned Bravo/1")}
 
 
 def test_one_that_is_led_counts_along_its_way_and_where_it_is() -> None:
-    led = led_ahead(np.array([(*moved_deg(HOME, 60.0, 0.0), UP_M)]), np.array([20.0]))
+    led = led_ahead(np.array([(*moved_deg(HOME, 60.0, 0.0), UP_M)]), np.array([20.0]), later_share(2))
     comes = Flown("Bee", at(60.0, -60.0), None, told=Flown("Bee", at(60.0, -60.0), led))
     assert way((0.0, 0.0), (60.0, 0.0), others=[comes]).reasons
     assert way((0.0, 0.0), (60.0, -60.0), others=[comes]).reasons
     assert way((0.0, 0.0), (-60.0, 0.0), others=[comes]) == Apart()
+
+
+def test_where_turns_make_it_late_it_is_met_as_late() -> None:
+    """An orbit takes up to six times as long as lengths and speeds say; another one crosses its last quarter then."""
+    around = [(20.0 - 20.0 * math.cos(k * math.pi / 16), 20.0 * math.sin(k * math.pi / 16)) for k in range(33)]
+    nominal_s = 2.0 * math.pi * 20.0 / SPEED_M_S
+    place = around[24]
+    outside = place[0], place[1] - 60.0
+    waits = ahead((*outside, 0.0), (*outside, 4.0 * nominal_s), (*place, 4.0 * nominal_s + 12.0))
+    assert way(*around, others=[Flown("Bee", at(*outside), waits)]).reasons
+
+
+def test_another_one_that_is_led_is_looked_along_as_far_as_it_may_have_come() -> None:
+    led = led_ahead(
+        np.array([(*moved_deg(HOME, 60.0, 165.0), UP_M), (*moved_deg(HOME, 60.0, -60.0), UP_M)]),
+        np.array([0.0, 75.0]),
+        later_share(3),
+    )
+    comes = Flown("Bee", at(60.0, 165.0), None, told=Flown("Bee", at(60.0, 165.0), led))
+    # It is at (60, 0) after 40 s to 175 s; this one is there after 8 s to 70 s and stays for 60 s.
+    assert way((0.0, 0.0), (60.0, 0.0), others=[comes]).reasons
 
 
 def test_where_no_height_of_home_tells_how_high_a_plan_is_it_is_as_high() -> None:

@@ -16,7 +16,7 @@ from planning.fence.fence_model import Fence, circle
 from planning.formats.fence_items import fence_items
 from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotFoundError, NotReadyError
 from server.flying.apart.nearness import Flown
-from server.flying.in_flight.way_desk import flown_places
+from server.flying.in_flight.judged_way import flown_places
 from server.flying.in_flight.way_task import WayJudged, wish_of
 from server.heard.channel import ShownWay
 from server.schemas import FenceDoc, FlyWayBody, GuidedState, PlaceDoc, WayBody, WaySpeedBody

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Any
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from hypothesis import strategies as st
 
 from mapping.geometry.frames import moved_deg, offset_m
 from server.errors import CheckNeededError, NotReadyError
+from server.flying.apart.nearness import Flown
 from server.flying.in_flight import way_desk
 from server.obstacles.surroundings import SEEN_BEFORE, _is_near, is_more_seen_near, returns_from
 from server.scene.mirror import MapMirror
@@ -79,9 +82,9 @@ def test_a_way_near_which_more_is_seen_since_it_was_judged_is_not_flown(
         top = int(bench.live.way.places[-1][2])
         wall = [(15, 0, z) for z in range(top + 2)]
         radar.fold(delta(wall, since=3, revision=4, **told))
-        with pytest.raises(CheckNeededError, match="seen more near the way since it was judged, and it is") as refused:
+        with pytest.raises(CheckNeededError, match="seen more near the way since it was judged: now it is") as refused:
             await bench.fly(FlyWayBody(id=way.id))
-        assert refused.value.advice == "Look at it as it is now, then fly it."
+        assert refused.value.advice == "Look at it again before it is flown."
         assert bench.desk.state.way is not None
         assert bench.desk.state.way.id != way.id, "what it is now is in hand, and was looked at by nobody"
         radar.fold(delta(wall, 20, since=4, revision=5, **told))
@@ -195,5 +198,82 @@ def test_who_walks_about_beside_a_take_off_is_no_matter_unless_he_is_near_it(
         radar.fold(delta([(12, 8, 0), (12, 8, 1)], whole=True, revision=3, origin=origin))
         await bench.fly(FlyWayBody(id=way.id))
         assert bench.vehicle.told
+
+    runner.run(scenario())
+
+
+def test_of_another_one_that_came_meanwhile_is_said_though_more_is_seen(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    """What is judged once more is no more than what was shown: whom nobody read of it is not flown to."""
+
+    async def scenario() -> None:
+        bench = WayBench(made, lane)
+        assert bench.live.state is not None
+        told = {"origin": MapOrigin(*made.home, bench.live.state.home_alt_amsl_m or 0.0)}
+        radar, place = bench.watch.mirrors["radar"], bench.beside(30.0, 0.0)
+        radar.fold(delta([], whole=True, revision=1, **told))
+        way = await bench.judged(action="to", place=place, height_m=20.0)
+        there = replace(bench.live.state, lat_deg=place.lat_deg, lon_deg=place.lon_deg, alt_amsl_m=None)
+        bench.others = [Flown("Bravo's Bee", there, None, key="Bravo/1")]
+        radar.fold(delta([(15, 20, 20)], since=1, revision=2, **told))
+        with pytest.raises(CheckNeededError, match="now it is as it is shown"):
+            await bench.fly(FlyWayBody(id=way.id))
+        assert bench.vehicle.told == []
+        shown = bench.desk.state.way
+        assert shown is not None
+        assert any("Bravo's Bee" in note for note in shown.notes)
+        await bench.fly(FlyWayBody(id=shown.id))
+        assert isinstance(bench.vehicle.told[-1], FlyWay)
+
+    runner.run(scenario())
+
+
+def test_what_is_seen_while_it_is_judged_once_more_counts(made: Made, lane: Lane, runner: asyncio.Runner) -> None:
+    async def scenario() -> None:
+        bench = WayBench(made, lane)
+        assert bench.live.state is not None
+        told = {"origin": MapOrigin(*made.home, bench.live.state.home_alt_amsl_m or 0.0)}
+        radar, call = bench.watch.mirrors["radar"], lane.call
+        radar.fold(delta([], whole=True, revision=1, **told))
+        way = await bench.judged(action="to", place=bench.beside(30.0, 0.0), height_m=20.0)
+        radar.fold(delta([(15, 20, 20)], since=1, revision=2, **told))
+        looks: list[int] = []
+
+        async def call_while_a_wall_comes(*args: Any) -> Any:
+            judged = await call(*args)
+            looks.append(1)
+            if len(looks) == 1:
+                assert bench.live.way is not None
+                top = int(bench.live.way.places[-1][2])
+                radar.fold(delta([(15, 0, z) for z in range(top + 2)], since=2, revision=3, **told))
+            return judged
+
+        bench.desk._lane = cast(Any, SimpleNamespace(call=call_while_a_wall_comes))
+        with pytest.raises(CheckNeededError, match="now it is as it is shown"):
+            await bench.fly(FlyWayBody(id=way.id))
+        assert len(looks) == 2
+        assert bench.vehicle.told == []
+
+    runner.run(scenario())
+
+
+def test_a_plan_that_changed_meanwhile_changes_nothing_of_what_was_shown(
+    made: Made, lane: Lane, runner: asyncio.Runner
+) -> None:
+    async def scenario() -> None:
+        bench = WayBench(made, lane)
+        assert bench.live.state is not None
+        told = {"origin": MapOrigin(*made.home, bench.live.state.home_alt_amsl_m or 0.0)}
+        radar = bench.watch.mirrors["radar"]
+        radar.fold(delta([], whole=True, revision=1, **told))
+        way = await bench.judged(action="to", place=bench.beside(30.0, 0.0), height_m=20.0)
+        radar.fold(delta([(15, 20, 20)], since=1, revision=2, **told))
+        profile = bench.document.profile.model_copy(update={"mean_speed_m_s": 5.0})
+        bench.document = bench.document.model_copy(update={"profile": profile})
+        await bench.fly(FlyWayBody(id=way.id))
+        request = bench.vehicle.told[-1]
+        assert isinstance(request, FlyWay)
+        assert {target.speed_m_s for target in request.targets} == {way.speed_m_s}, "by what was shown"
 
     runner.run(scenario())

@@ -16,7 +16,7 @@ from mapping.geometry.frames import offset_m
 from planning.following.separation import Nearest, TimedLine, nearest
 from server.errors import reported
 from server.heard.channel import Channel
-from server.heard.plan_follower import Ahead
+from server.heard.plan_follower import EARLY_LATE_SHARE, Ahead
 from server.schemas import VehicleAlarm
 from telemetry.topics.vehicle import VehicleState
 
@@ -251,7 +251,7 @@ def line_of(
         points_m = np.vstack([here_m, np.column_stack([east_m, north_m, up_m])])
         t_s = heard_s + np.concatenate([[0.0], ahead.t_s])
         return TimedLine(
-            *((points_m, t_s) if ahead_s is None else _until(points_m, t_s, now_s + ahead_s)),
+            *((points_m, t_s) if ahead_s is None else _until(points_m, t_s, now_s + _middle_s(ahead, ahead_s))),
             radius_m,
             early_late_s=ahead.early_late_s,
             early_late_share=ahead.early_late_share,
@@ -260,6 +260,14 @@ def line_of(
     ends_s = now_s + ((ahead_s or AHEAD_S) if speed_m_s < STANDS_M_S else STRAIGHT_S) - heard_s
     points_m = np.stack([here_m, here_m + ends_s * v_enu_m_s])
     return TimedLine(points_m, np.array([heard_s, heard_s + ends_s]), radius_m, VEER_SHARE * speed_m_s)
+
+
+def _middle_s(ahead: Ahead, end_s: float) -> float:
+    """So far by the middle of its times: all that it may be on until then, where these are known as badly as a led
+    way's; a plan's own margin is small beside what is looked ahead."""
+    if ahead.early_late_share <= EARLY_LATE_SHARE:
+        return end_s
+    return (end_s + ahead.early_late_s) / (1.0 - ahead.early_late_share)
 
 
 def _until(points_m: np.ndarray, t_s: np.ndarray, end_s: float) -> tuple[np.ndarray, np.ndarray]:

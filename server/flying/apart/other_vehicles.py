@@ -29,6 +29,7 @@ from server.flying.apart.nearness import (
     flown_of,
     line_of,
 )
+from server.flying.apart.way_apart import where_parted
 from server.heard.channel import Channel
 from server.heard.plan_follower import EARLY_LATE_S, EARLY_LATE_SHARE, Whole
 from server.schemas import CheckRow
@@ -86,7 +87,7 @@ class _Met:
 
 def known(name: str, channel: Channel, *, is_verified: bool, waits_in_air: bool = False) -> Other:
     whole = channel.follower.whole() if is_verified else None
-    return Other(flown_of(name, channel), channel.in_air, whole, waits_in_air)
+    return Other(flown_of(name, channel), channel.in_air or channel.led is not None, whole, waits_in_air)
 
 
 class OtherVehicles:
@@ -254,11 +255,11 @@ def _against(who: Other, mine: Whole, other: Other, now_s: float) -> CheckRow | 
         text = f"{name} has a mission on board that comes within {met.distance_m:.0f} m of this one,"
         return _row("accept", f"{text} at {_place(origin_deg, met)}.", "Fly one after the other, or plan them apart.")
     if other.flown.ahead is None or other.on_board is None or theirs.lat_deg is None:
-        met = (
-            None if theirs.lat_deg is None else _meets_unplanned(mine, way_m, other.flown, origin_deg, now_s, flat=flat)
-        )
-        if met is not None and not _is_only_there(who, other.flown, now_s):
-            return _too_near(who, name, met, origin_deg, now_s)
+        met = None
+        if theirs.lat_deg is not None:
+            met = _meets_unplanned(who, mine, way_m, other.flown, origin_deg, now_s, flat=flat)
+        if met is not None:
+            return _or_was_there(_too_near(who, name, met, origin_deg, now_s), theirs, now_s)
         text = f"{name} is in the air, and no plan tells where it will be."
         return _row("accept", text, "Agree with whoever flies it.")
     theirs_ahead = [line_of(other.flown, origin_deg, now_s, flat=flat, ahead_s=None)]
@@ -274,25 +275,28 @@ def _against(who: Other, mine: Whole, other: Other, now_s: float) -> CheckRow | 
     return _too_near(who, name, met, origin_deg, now_s)
 
 
+def _or_was_there(row: CheckRow, theirs: VehicleState, now_s: float) -> CheckRow:
+    """Where it was last heard long ago nobody can lead it away, nor say that it is there still."""
+    silent_s = 0.0 if theirs.position_t_mono_s is None else now_s - theirs.position_t_mono_s
+    if silent_s <= OLD_S:
+        return row
+    return _row(
+        "accept", f"{row.text} It was last heard {silent_s:.0f} s ago.", "Make sure that it has landed or is elsewhere."
+    )
+
+
 def _meets_unplanned(
-    mine: Whole, way_m: F64, other: Flown, origin_deg: tuple[float, float], now_s: float, *, flat: bool
+    who: Other, mine: Whole, way_m: F64, other: Flown, origin_deg: tuple[float, float], now_s: float, *, flat: bool
 ) -> Nearest | None:
-    """One that hovers, or is led along a way of its own: for as long as ``HORIZON_S``."""
+    """One that hovers, or is led along a way of its own: for as long as ``HORIZON_S``. Who holds beside it may be led
+    away: what comes after they have parted counts."""
     theirs = [line_of(each, origin_deg, now_s, flat=flat, ahead_s=HORIZON_S) for each in both_ways(other)]
-    return _first([(one, line) for one in _timed(mine, way_m, now_s) for line in theirs], now_s)
-
-
-def _is_only_there(who: Other, other: Flown, now_s: float) -> bool:
-    """It was last heard there, long ago; or this one holds that near to it, and may be led away."""
-    heard_s, mine = other.state.position_t_mono_s, who.flown.state
-    if heard_s is not None and now_s - heard_s > OLD_S:
-        return True
-    if not who.waits_in_air or mine.lat_deg is None or mine.lon_deg is None:
-        return False
-    here_deg = mine.lat_deg, mine.lon_deg
-    flat_m = math.hypot(*offset_m(here_deg, other.state.lat_deg or 0.0, other.state.lon_deg or 0.0))
-    up_m = (mine.alt_amsl_m or 0.0) - (other.state.alt_amsl_m or 0.0)
-    return math.hypot(flat_m, up_m) < NEAR_M + 2.0 * RADIUS_M
+    parts = _timed(mine, way_m, now_s)
+    if who.waits_in_air and not flat:
+        here_m, near_m = theirs[0].points_enu_m[0], NEAR_M + RADIUS_M + theirs[0].radius_m
+        if np.linalg.norm(parts[0].points_enu_m[0] - here_m) < near_m:
+            parts = [where_parted(parts[0], here_m, near_m)[1] or parts[0], *parts[1:]]
+    return _first([(one, line) for one in parts for line in theirs], now_s)
 
 
 def _first(pairs: Sequence[tuple[TimedLine, TimedLine]], now_s: float) -> Nearest | None:

@@ -10,7 +10,7 @@ import numpy as np
 from mapping.geometry.arrays import F64
 from planning.following.separation import TimedLine, nearest
 from server.flying.apart.nearness import AHEAD_S, NEAR_M, STANDS_M_S, Flown, both_ways, line_of
-from server.heard.led_way import Places, latest_s, led_ahead
+from server.heard.led_way import Places, later_share, latest_s, led_ahead
 from server.schemas import ReasonDoc
 from telemetry.topics.vehicle import VehicleState
 
@@ -32,16 +32,16 @@ class Apart:
     """It would lead near others of this station: these can be held or led away first."""
     notes: tuple[str, ...] = ()
     """Of what nobody here can hold, or can tell where it will be."""
-    noted: frozenset[str] = frozenset()
-    """Whom the notes name."""
+    noted: frozenset[tuple[str, str]] = frozenset()
+    """Whom the notes name, and why."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Met:
     distance_m: float
     in_s: float
-    parts: bool = False
-    """Both begin so near, and the way leads apart."""
+    begins: bool = False
+    """Both begin so near, and the way parts them, or leaves the vehicle where it is."""
 
 
 def way_apart(state: VehicleState, places: Places, t_s: F64, others: Sequence[Flown], now_mono_s: float) -> Apart:
@@ -52,16 +52,20 @@ def way_apart(state: VehicleState, places: Places, t_s: F64, others: Sequence[Fl
         begins |= {"lat_deg": places[0][0], "lon_deg": places[0][1]}
     if not state.armed and state.alt_amsl_m is not None:
         begins["home_alt_amsl_m"] = state.alt_amsl_m  # it takes its home where it stands when it arms
-    mine = Flown("", replace(state, **begins), led_ahead(np.array(places, dtype=float), t_s))  # type: ignore[arg-type]
-    until_s = latest_s(float(t_s[-1])) + AHEAD_S
-    reasons, notes = list[ReasonDoc](), dict[str, str]()
+    later = later_share(len(places))
+    mine = Flown("", replace(state, **begins), led_ahead(np.array(places, dtype=float), t_s, later))  # type: ignore[arg-type]
+    until_s = latest_s(float(t_s[-1]), later) + AHEAD_S
+    reasons, notes, noted = list[ReasonDoc](), list[str](), set[tuple[str, str]]()
     for other in others:
         met = None if other.state.lat_deg is None else _met(mine, other, until_s, now_mono_s)
-        if met is not None and not met.parts and not other.key:
+        if met is not None and not met.begins and not other.key:
             reasons.append(_reason(other, met, now_mono_s))
-        elif words := _note(other, met, now_mono_s):
-            notes[other.name] = words
-    return Apart(tuple(reasons), tuple(notes.values()), frozenset(notes))
+            continue
+        why, words = _note(other, met, now_mono_s)
+        if words:
+            notes.append(words)
+            noted.add((other.name, f"{why} {other.key}".rstrip()))
+    return Apart(tuple(reasons), tuple(notes), frozenset(noted))
 
 
 def _reason(other: Flown, met: _Met, now_s: float) -> ReasonDoc:
@@ -71,21 +75,22 @@ def _reason(other: Flown, met: _Met, now_s: float) -> ReasonDoc:
     return ReasonDoc(code="others", text=f"{_near(name, met)}.", mend=mend)
 
 
-def _note(other: Flown, met: _Met | None, now_s: float) -> str:
-    name = other.name
-    if met is not None and met.parts:
-        return f"It begins within {met.distance_m:.0f} m of {name}, and leads apart from it."
+def _note(other: Flown, met: _Met | None, now_s: float) -> tuple[str, str]:
+    """Why, in a word, and the sentence; empty: nothing is to be said."""
+    name, silent_s = other.name, _silent_s(other, now_s)
+    if met is not None and met.begins:
+        return "begins", f"It begins within {met.distance_m:.0f} m of {name}."
     if met is not None:
-        return f"{_near(name, met)}: call the other station."
+        return "near", f"{_near(name, met)}: call the other station."
     if other.state.lat_deg is None:
-        return f"{name} is in the air, and does not tell where."
-    if other.key:
-        return f"{name} is not heard any more, and may be where this way leads." if other.is_silent else ""
-    if (silent_s := _silent_s(other, now_s)) > SILENT_S:
-        return f"{name} was last heard {silent_s:.0f} s ago, and may be where this way leads."
+        return "nowhere", f"{name} is in the air, and does not tell where."
+    if other.is_silent:
+        return "silent", f"{name} is not heard any more, and may be where this way leads."
+    if silent_s > SILENT_S:
+        return "silent", f"{name} was last heard {silent_s:.0f} s ago, and may be where this way leads."
     if other.ahead is None and other.told is None and not _stands(other.state):
-        return f"{name} is in the air, and no plan tells where it will be."
-    return ""
+        return "unplanned", f"{name} is in the air, and no plan tells where it will be."
+    return "", ""
 
 
 def _near(name: str, met: _Met) -> str:
@@ -96,7 +101,7 @@ def _near(name: str, met: _Met) -> str:
 def _met(mine: Flown, other: Flown, until_s: float, now_s: float) -> _Met | None:
     """None: it does not come too near. The nearest of what the other one may fly."""
     found = [at for way in both_ways(other) if (at := _met_on(mine, way, until_s, now_s)) is not None]
-    return min(found, key=lambda at: (at.parts, at.distance_m, at.in_s), default=None)
+    return min(found, key=lambda at: (at.begins, at.distance_m, at.in_s), default=None)
 
 
 def _met_on(mine: Flown, other: Flown, until_s: float, now_s: float) -> _Met | None:
@@ -112,12 +117,14 @@ def _met_on(mine: Flown, other: Flown, until_s: float, now_s: float) -> _Met | N
     near_m = NEAR_M + one.radius_m + two.radius_m
     if begins_m >= near_m or flat:
         return _near_on(one, two, now_s)
-    leaving, rest = _where_parted(one, two.points_enu_m[0], near_m + NEARER_M)
+    leaving, rest = where_parted(one, two.points_enu_m[0], near_m + NEARER_M)
+    if rest is None and np.ptp(one.points_enu_m, axis=0).max() > NEARER_M:
+        return _near_on(one, two, now_s)  # it goes about there, and never parts
     least = nearest(_bare(leaving), _bare(two), since_s=now_s)
     if least is not None and least.distance_m < begins_m - NEARER_M:
         return _near_on(leaving, two, now_s)
     met = None if rest is None else _near_on(rest, two, now_s)
-    return met or _Met(max(0.0, begins_m - one.radius_m - two.radius_m), 0.0, parts=True)
+    return met or _Met(max(0.0, begins_m - one.radius_m - two.radius_m), 0.0, begins=True)
 
 
 def _near_on(one: TimedLine, two: TimedLine, now_s: float) -> _Met | None:
@@ -136,7 +143,7 @@ def _when_at(line: TimedLine, place_enu_m: F64) -> float:
     return float(line.t_s[leg] + share[leg] * (line.t_s[leg + 1] - line.t_s[leg]))
 
 
-def _where_parted(line: TimedLine, from_enu_m: F64, far_m: float) -> tuple[TimedLine, TimedLine | None]:
+def where_parted(line: TimedLine, from_enu_m: F64, far_m: float) -> tuple[TimedLine, TimedLine | None]:
     """The line up to where it is first so far from a place, and what comes after; None: it never is."""
     for leg, share in _steps(line.points_enu_m):
         at_m = (1.0 - share) * line.points_enu_m[leg] + share * line.points_enu_m[leg + 1]

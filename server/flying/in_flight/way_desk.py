@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import time
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-from mapping.geometry.frames import apart_m
 from server.errors import CheckNeededError, ConflictError, NotCertifiedError, NotFoundError, NotReadyError
 from server.flying.apart.way_apart import Apart, Others, way_apart
-from server.flying.in_flight.judged_way import is_same_way, looked_along, required_m, to_its_end, way_doc
+from server.flying.in_flight.judged_way import (
+    InHand,
+    asked_again,
+    flown_places,
+    is_over,
+    is_same_way,
+    looked_along,
+    required_m,
+    to_its_end,
+    way_doc,
+)
 from server.flying.in_flight.way_task import WayAsked, WayJudged, judge_way
 from server.heard.channel import Channel, ShownWay
 from server.heard.led_way import LedWay
@@ -32,17 +41,16 @@ from server.schemas import (
     Pages,
     TerrainDoc,
     WayBody,
-    WayDoc,
     WaySpeedBody,
 )
 from server.schemas.flight_docs import CHECK_FRESH_S
 from server.work.jobs import Lane
 from server.workspace import Workspace
 from telemetry.bus.link_client import LinkClient
-from telemetry.errors import NoVehicleError
+from telemetry.errors import BusError, NoVehicleError
 from telemetry.flight.certified_way import way_request
 from telemetry.flight.guided.beginning import why_moves
-from telemetry.flight.home_watch import HomePlace, home_of, home_of_takeoff, is_there
+from telemetry.flight.home_watch import home_of, home_of_takeoff, is_there
 from telemetry.flight.preflight.parameters import NAMES
 from telemetry.mavlink.believing import is_in_the_air
 from telemetry.topics.messages import FlightStatus
@@ -52,24 +60,11 @@ from telemetry.topics.vehicle import VehicleState
 
 SEEN_WITHIN_S = 1.0
 """A way that is to be flown now waits no longer for a map that is just being told."""
-TAKE_OFF_M = 1.0
-"""A climb that strays no farther to the side is the take-off."""
-SEEN_AGO_S = 10.0
-"""What a way is judged by once more when it is ordered is no older when it is flown."""
+SEEN_AGO_S, LOOKS = 10.0, 3
+"""What a way is judged by once more when it is ordered is no older when it is flown; so often it is judged at most."""
+TOLD_WITHIN_S = 120.0
+"""Of a way that was ordered, and whose answer was lost, the vehicle has told by then if it flies it."""
 NOWHERE = "Nothing is judged any more, or another way was judged meanwhile."
-
-
-@dataclass(frozen=True, slots=True)
-class _InHand:
-    doc: WayDoc
-    judged: WayJudged
-    judged_mono_s: float
-    home: HomePlace | None
-    """From which its heights count."""
-    asked: WayAsked
-    """What it was judged by."""
-    apart: Apart
-    flies_since_utc_s: float | None = None
 
 
 class WayDesk:
@@ -87,7 +82,7 @@ class WayDesk:
     ) -> None:
         self._link, self._live, self._workspace, self._library = link, live, workspace, library
         self._lane, self._watch, self._pages = lane, watch, pages
-        self._in_hand: _InHand | None = None
+        self._in_hand: InHand | None = None
         self._is_judging = self._is_ordering = False
         self._adopted: str | None = None
 
@@ -97,8 +92,9 @@ class WayDesk:
 
     async def judge(self, operator: Operator, body: WayBody, others: Others) -> GuidedState:
         """Nothing moves. Raises what the vehicle said, NotAllowedError, NotReadyError, MissionError, ParameterError."""
-        if self._is_judging:
-            raise ConflictError("Another way is being judged.", advice="Wait until it is done.")
+        if self._is_judging or self._is_ordering:
+            does = "judged" if self._is_judging else "ordered"
+            raise ConflictError(f"Another way is being {does}.", advice="Wait until it is done.")
         before = self._in_hand
         flown = before if before is not None and before.doc.flies else None
         if flown is not None and self._live.flight.phase != "paused":
@@ -111,7 +107,7 @@ class WayDesk:
         try:
             asked = await self.asked(operator, body)
             judged: WayJudged = await self._lane.call(judge_way, asked)
-            in_hand = await self._taken(asked, judged, terrain, others)
+            in_hand = await self._taken(asked, judged, terrain.name, others)
             self._check_still(vehicle, flown)
             self._in_hand = in_hand
         finally:
@@ -119,11 +115,11 @@ class WayDesk:
             self._tell()
         return self.state
 
-    async def _taken(self, asked: WayAsked, judged: WayJudged, terrain: TerrainDoc, others: Others) -> _InHand:
+    async def _taken(self, asked: WayAsked, judged: WayJudged, over: str, others: Others) -> InHand:
         home = home_of(asked.state)
         notes = await self.seen_before(asked.maps, looked_along(judged, home), required_m(judged))
         apart = await self._apart(judged, others)
-        return _InHand(way_doc(judged, asked.body, terrain, notes, apart), judged, time.monotonic(), home, asked, apart)
+        return InHand(way_doc(judged, asked.body, over, notes, apart), judged, time.monotonic(), home, asked, apart)
 
     async def fly(self, operator: Operator, body: FlyWayBody, others: Others) -> None:
         """Raises NotFoundError, NotCertifiedError, CheckNeededError where home was moved, more was seen, or another
@@ -149,9 +145,9 @@ class WayDesk:
             what = "Another vehicle is in the way" if doc.problem == "others" else "The way is not certified"
             what += "." if first is None else f": {first.text}"
             raise NotCertifiedError(what, advice="" if first is None else first.mend)
-        self._check_home(in_hand)
-        in_hand = await self._by_what_is_seen_now(in_hand, others, accepts=body.accept_return)
-        self._check_home(in_hand)
+        shown = in_hand
+        in_hand = await self._by_what_is_seen_now(shown, others)
+        self._check_home(shown)
         judged, since_utc_s = in_hand.judged, time.time()
         speed_m_s, most_m_s = judged.speed_m_s, judged.most_m_s
         request = way_request(operator, judged.way, judged.wish, in_hand.home, speed_m_s=speed_m_s, most_m_s=most_m_s)
@@ -161,6 +157,8 @@ class WayDesk:
         try:
             await self._check_apart(in_hand, others)
             await self._link.call(request)
+        except (BusError, asyncio.CancelledError):
+            raise  # it may be done all the same
         except BaseException:
             self._live.led = before
             raise
@@ -172,9 +170,9 @@ class WayDesk:
     async def set_speed(self, operator: Operator, body: WaySpeedBody) -> None:
         """Raises NotAllowedError where no way is flown, or it is certified for less."""
         await self._link.call(SetSpeed(operator, body.speed_m_s))
+        if self._live.led is not None:
+            self._live.led.at_speed(body.speed_m_s)
         if (in_hand := self._in_hand) is not None and in_hand.doc.flies:
-            if self._live.led is not None:
-                self._live.led.at_speed(body.speed_m_s)
             doc = in_hand.doc.model_copy(update={"speed_m_s": body.speed_m_s})
             self._in_hand = replace(in_hand, doc=doc)
             self._tell()
@@ -192,17 +190,21 @@ class WayDesk:
         since_utc_s = None if self._in_hand is None else self._in_hand.flies_since_utc_s
         if since_utc_s is None or flight.since_utc_s is None or flight.since_utc_s < since_utc_s:
             return
-        if _is_over(flight):
+        if is_over(flight):
             self._in_hand = None
             self._tell()
 
     def _end_led(self, flight: FlightStatus) -> None:
         """A way that is held stays where it may fly, whatever was judged since: it may be gone on with."""
         led = self._live.led
-        if led is None or flight.since_utc_s is None or flight.since_utc_s < led.since_utc_s:
+        if led is None:
+            return
+        if flight.since_utc_s is None or flight.since_utc_s < led.since_utc_s:
+            if time.time() - led.since_utc_s > TOLD_WITHIN_S:
+                self._live.led = None  # it was never begun
             return
         led.is_new = False
-        if _is_over(flight):
+        if is_over(flight):
             self._live.led = None
 
     def on_link(self, vehicle: str | None) -> None:
@@ -264,13 +266,18 @@ class WayDesk:
         return not await asyncio.to_thread(is_same_seen, asked.maps, seen)
 
     async def has_seen_more_near(
-        self, maps: tuple[Voxels, ...], line_deg: list[tuple[float, float]], clearance_m: float
+        self,
+        maps: tuple[Voxels, ...],
+        line_deg: list[tuple[float, float]],
+        clearance_m: float,
+        *,
+        with_shadow: bool = True,
     ) -> bool:
         """Whether sensors have seen more by now than ``maps``, so near to a line (lat_deg, lon_deg) that keeps such a
         clearance that it may matter. Raises NotReadyError where nobody knows."""
         seen = await seen_maps(self._watch, SEEN_WITHIN_S)
         # Of a take-off who walks about farther away is no matter: nothing is flown along yet that could be behind him.
-        near_m = clearance_m + (SHADOW_M if is_in_the_air(self._vehicle()) else 0.0)
+        near_m = clearance_m + (SHADOW_M if with_shadow and is_in_the_air(self._vehicle()) else 0.0)
         return await asyncio.to_thread(is_more_seen_near, maps, seen, line_deg, near_m)
 
     async def seen_before(
@@ -282,7 +289,7 @@ class WayDesk:
 
     # How
 
-    async def _by_what_is_seen_now(self, in_hand: _InHand, others: Others, *, accepts: bool) -> _InHand:
+    async def _by_what_is_seen_now(self, in_hand: InHand, others: Others) -> InHand:
         """Judged anew where sensors have seen more near the way, or near a return from anywhere on it that is certified
         with it, since it was judged: wrong matches of a camera come and go with each frame, and do not matter where the
         way is as it was. Raises CheckNeededError where it is not, with what it is now in hand; NotReadyError where
@@ -292,34 +299,42 @@ class WayDesk:
         self._is_judging = True
         self._tell()
         try:
-            asked = await self.renewed(in_hand.asked)
-            begun_mono_s = time.monotonic()
-            judged: WayJudged = await self._lane.call(judge_way, asked)
-            now = await self._taken(asked, judged, self._terrain(), others)
+            for _ in range(LOOKS):
+                begun_mono_s, asked = time.monotonic(), await self._once_more(in_hand.asked)
+                judged: WayJudged = await self._lane.call(judge_way, asked)
+                now = await self._taken(asked, judged, in_hand.doc.terrain_name, others)
+                self._check_in_hand(in_hand)
+                if not is_same_way(judged, in_hand.judged) or not now.apart.noted <= in_hand.apart.noted:
+                    self._in_hand = now
+                    what = "Sensors have seen more near the way since it was judged: now it is as it is shown."
+                    raise CheckNeededError(what, advice="Look at it again before it is flown.")
+                sees_more = await self._sees_more(now, in_hand, with_shadow=False)
+                if not sees_more and time.monotonic() - begun_mono_s <= SEEN_AGO_S:
+                    self._in_hand = replace(
+                        now, doc=now.doc.model_copy(update={"id": in_hand.doc.id}), judged_mono_s=in_hand.judged_mono_s
+                    )
+                    return self._in_hand
         finally:
             self._is_judging = False
             self._tell()
-        self._check_in_hand(in_hand)
-        is_same = is_same_way(judged.way, in_hand.judged.way) and now.doc.problem == in_hand.doc.problem
-        may_fly = now.doc.problem is None or (now.doc.problem == "return" and accepts)
-        self._in_hand = replace(now, doc=now.doc.model_copy(update={"id": in_hand.doc.id}) if is_same else now.doc)
-        self._tell()
-        if not is_same or not may_fly:
-            what = "Sensors have seen more near the way since it was judged, and it is another one now."
-            raise CheckNeededError(what, advice="Look at it as it is now, then fly it.")
-        if time.monotonic() - begun_mono_s > SEEN_AGO_S:
-            what = f"Judging the way by what is seen now took more than {SEEN_AGO_S:.0f} s: more may be there by now."
-            raise CheckNeededError(what, advice="Close what else runs here, then ask for the way again.")
-        return self._in_hand
+        what = f"Sensors see more close to the way each time that it is judged, {LOOKS} times by now."
+        raise CheckNeededError(what, advice="Look what is there, and ask for the way again.")
 
-    async def _sees_more(self, in_hand: _InHand) -> bool:
-        """Raises NotReadyError where nobody knows."""
-        line_deg = looked_along(in_hand.judged, in_hand.home)
-        sees_more = await self.has_seen_more_near(in_hand.asked.maps, line_deg, required_m(in_hand.judged))
-        self._check_in_hand(in_hand)
+    async def _once_more(self, asked: WayAsked) -> WayAsked:
+        """By what is seen now, all else as it was shown; from the same place, as long as it only wanders there."""
+        return asked_again(asked, await self.renewed(asked))
+
+    async def _sees_more(self, judged: InHand, in_hand: InHand | None = None, *, with_shadow: bool = True) -> bool:
+        """Than ``judged`` was judged by. Raises NotReadyError where nobody knows, NotFoundError where what is in hand
+        was put away."""
+        line_deg = looked_along(judged.judged, judged.home)
+        sees_more = await self.has_seen_more_near(
+            judged.asked.maps, line_deg, required_m(judged.judged), with_shadow=with_shadow
+        )
+        self._check_in_hand(in_hand or judged)
         return sees_more
 
-    def _check_in_hand(self, in_hand: _InHand) -> None:
+    def _check_in_hand(self, in_hand: InHand) -> None:
         """Raises NotFoundError where it was put away meanwhile."""
         if self._in_hand is not in_hand:
             raise NotFoundError(NOWHERE, advice="Ask for the way again.")
@@ -329,17 +344,18 @@ class WayDesk:
         places, t_s = to_its_end(judged)
         return await asyncio.to_thread(way_apart, self._vehicle(), places, t_s, tuple(others()), time.monotonic())
 
-    async def _check_apart(self, in_hand: _InHand, others: Others) -> None:
+    async def _check_apart(self, in_hand: InHand, others: Others) -> None:
         """Raises CheckNeededError where it would lead near another vehicle by now of which the card says nothing."""
         apart = await self._apart(in_hand.judged, others)
         self._check_in_hand(in_hand)
         if apart.reasons:
             raise CheckNeededError(apart.reasons[0].text, advice=apart.reasons[0].mend)
         if new := apart.noted - in_hand.apart.noted:
-            what = f"Since the way was judged {' and '.join(sorted(new))} came to where it leads, or may have."
+            names = " and ".join(sorted({name for name, _ in new}))
+            what = f"Since the way was judged {names} came to where it leads, or may have."
             raise CheckNeededError(what, advice="Ask for the way again.")
 
-    def _check_home(self, in_hand: _InHand) -> None:
+    def _check_home(self, in_hand: InHand) -> None:
         """Raises CheckNeededError where home was moved since: the way's places would be elsewhere. A vehicle on the
         ground takes its home when it arms, which is looked at then."""
         state, home = self._vehicle(), in_hand.home
@@ -349,7 +365,7 @@ class WayDesk:
         self._tell()
         raise CheckNeededError("Home was moved since the way was judged.", advice="Ask for the way again.")
 
-    def _check_still(self, vehicle: str | None, flown: _InHand | None) -> None:
+    def _check_still(self, vehicle: str | None, flown: InHand | None) -> None:
         """Raises ConflictError for a way that nobody can fly any more, once it is judged."""
         if vehicle != self._adopted:
             raise ConflictError("Another vehicle was adopted meanwhile.", advice="Ask for the way again.")
@@ -379,21 +395,3 @@ class WayDesk:
         in_hand = self._in_hand
         self._live.way = None if in_hand is None else ShownWay(in_hand.judged.way.places, in_hand.doc.problem is None)
         self._pages.publish(GuidedMessage(guided=self.state))
-
-
-def _is_over(flight: FlightStatus) -> bool:
-    return flight.is_flown or flight.way != "guided" or flight.phase in ("idle", "landed", "interrupted")
-
-
-def flown_places(states: list[VehicleState]) -> tuple[tuple[float, float, float], ...]:
-    """(lat_deg, lon_deg, alt_rel_home_m) from the top of the take-off on: what lies below is its own column."""
-    places = [
-        (state.lat_deg, state.lon_deg, state.alt_rel_home_m)
-        for state in states
-        if state.landed != "on_ground"
-        and state.lat_deg is not None
-        and state.lon_deg is not None
-        and state.alt_rel_home_m is not None
-    ]
-    left = next((k for k, place in enumerate(places) if apart_m(place[:2], places[0][:2]) > TAKE_OFF_M), len(places))
-    return tuple(places[max(0, left - 1) :])
