@@ -210,7 +210,7 @@ def test_of_another_one_that_came_meanwhile_is_said_though_more_is_seen(
     async def scenario() -> None:
         bench = WayBench(made, lane)
         assert bench.live.state is not None
-        told = {"origin": MapOrigin(*made.home, bench.live.state.home_alt_amsl_m or 0.0)}
+        told: dict[str, Any] = {"origin": MapOrigin(*made.home, bench.live.state.home_alt_amsl_m or 0.0)}
         radar, place = bench.watch.mirrors["radar"], bench.beside(30.0, 0.0)
         radar.fold(delta([], whole=True, revision=1, **told))
         way = await bench.judged(action="to", place=place, height_m=20.0)
@@ -233,7 +233,7 @@ def test_what_is_seen_while_it_is_judged_once_more_counts(made: Made, lane: Lane
     async def scenario() -> None:
         bench = WayBench(made, lane)
         assert bench.live.state is not None
-        told = {"origin": MapOrigin(*made.home, bench.live.state.home_alt_amsl_m or 0.0)}
+        told: dict[str, Any] = {"origin": MapOrigin(*made.home, bench.live.state.home_alt_amsl_m or 0.0)}
         radar, call = bench.watch.mirrors["radar"], lane.call
         radar.fold(delta([], whole=True, revision=1, **told))
         way = await bench.judged(action="to", place=bench.beside(30.0, 0.0), height_m=20.0)
@@ -264,7 +264,7 @@ def test_a_plan_that_changed_meanwhile_changes_nothing_of_what_was_shown(
     async def scenario() -> None:
         bench = WayBench(made, lane)
         assert bench.live.state is not None
-        told = {"origin": MapOrigin(*made.home, bench.live.state.home_alt_amsl_m or 0.0)}
+        told: dict[str, Any] = {"origin": MapOrigin(*made.home, bench.live.state.home_alt_amsl_m or 0.0)}
         radar = bench.watch.mirrors["radar"]
         radar.fold(delta([], whole=True, revision=1, **told))
         way = await bench.judged(action="to", place=bench.beside(30.0, 0.0), height_m=20.0)
