@@ -29,7 +29,7 @@ from server.flying.apart.nearness import (
     flown_of,
     line_of,
 )
-from server.flying.apart.way_apart import where_parted
+from server.flying.apart.way_apart import boxes_apart_m, where_parted
 from server.heard.channel import Channel
 from server.heard.plan_follower import EARLY_LATE_S, EARLY_LATE_SHARE, Whole
 from server.schemas import CheckRow
@@ -182,7 +182,7 @@ def meets_elsewhere(mine: Other, flown: Sequence[Flown], now_s: float) -> CheckR
     for other in sorted(flown, key=lambda each: _off_m(origin_deg, each)):
         line = None if other.told is None else line_of(other.told, origin_deg, now_s, flat=flat, ahead_s=None)
         line = None if line is None else _until(line, now_s + HORIZON_S)
-        if line is None or _boxes_apart_m(way_m, line.points_enu_m) >= NEAR_M + RADIUS_M + line.radius_m:
+        if line is None or boxes_apart_m(way_m, line.points_enu_m) >= NEAR_M + RADIUS_M + line.radius_m:
             continue
         looked_at += 1
         if looked_at > MOST_LINES:
@@ -214,12 +214,6 @@ def _until(line: TimedLine, end_s: float) -> TimedLine | None:
 
 def _off_m(origin_deg: tuple[float, float], other: Flown) -> float:
     return math.hypot(*offset_m(origin_deg, other.state.lat_deg or 0.0, other.state.lon_deg or 0.0))
-
-
-def _boxes_apart_m(one_m: F64, other_m: F64) -> float:
-    """No places of both are nearer to each other."""
-    gap_m = np.maximum(one_m.min(axis=0) - other_m.max(axis=0), other_m.min(axis=0) - one_m.max(axis=0))
-    return float(np.linalg.norm(np.maximum(gap_m, 0.0)))
 
 
 def row_against(mine: Other, others: Sequence[Other], now_s: float) -> CheckRow:

@@ -111,7 +111,7 @@ def _met_on(mine: Flown, other: Flown, until_s: float, now_s: float) -> _Met | N
         heights.append(other.state.home_alt_amsl_m)
     flat = any(height_m is None for height_m in heights)
     one, two = (line_of(each, origin_deg, now_s, flat=flat, ahead_s=until_s) for each in (mine, other))
-    if _boxes_apart_m(one, two) >= NEAR_M:
+    if _balls_apart_m(one, two) >= NEAR_M:
         return None
     begins_m = float(np.linalg.norm(one.points_enu_m[0] - two.points_enu_m[0]))
     near_m = NEAR_M + one.radius_m + two.radius_m
@@ -173,14 +173,16 @@ def _steps(points_m: F64) -> Iterator[tuple[int, float]]:
             yield leg, step / steps
 
 
-def _boxes_apart_m(one: TimedLine, two: TimedLine) -> float:
+def _balls_apart_m(one: TimedLine, two: TimedLine) -> float:
     """No balls of both are nearer to each other: at a glance, of many."""
-    gaps_m = np.maximum(
-        one.points_enu_m.min(axis=0) - two.points_enu_m.max(axis=0),
-        two.points_enu_m.min(axis=0) - one.points_enu_m.max(axis=0),
-    )
     balls_m = sum(line.radius_m + line.spread_m_s * float(line.t_s[-1] - line.t_s[0]) for line in (one, two))
-    return float(np.linalg.norm(np.maximum(gaps_m, 0.0))) - balls_m
+    return boxes_apart_m(one.points_enu_m, two.points_enu_m) - balls_m
+
+
+def boxes_apart_m(one_enu_m: F64, other_enu_m: F64) -> float:
+    """No places of both are nearer to each other."""
+    gap_m = np.maximum(one_enu_m.min(axis=0) - other_enu_m.max(axis=0), other_enu_m.min(axis=0) - one_enu_m.max(axis=0))
+    return float(np.linalg.norm(np.maximum(gap_m, 0.0)))
 
 
 def _bare(line: TimedLine) -> TimedLine:
