@@ -193,7 +193,7 @@ function Facts({ way }: { way: WayDoc }) {
       <dd>{demanded(way.required_m)}</dd>
       <dt>Length</dt>
       <dd>{metres(way.length_m, 0)}</dd>
-      <dt>Takes</dt>
+      <dt>Takes at least</dt>
       <dd>{withUnit(way.seconds, "s")}</dd>
     </dl>
   );
